@@ -1,0 +1,66 @@
+"""The compiled kernels; arrays are C-contiguous and of exactly these types (nothing is converted)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Int32 = NDArray[np.int32]
+Float64 = NDArray[np.float64]
+
+class Stars:
+    """Stars, blocks and block colours of a mesh; the arrays are described in kernels/stars.hpp."""
+
+    def __init__(self, simplices: Int32, n: int) -> None: ...
+    @property
+    def offsets(self) -> Int32: ...
+    @property
+    def incident(self) -> Int32: ...
+    @property
+    def faces(self) -> NDArray[np.uint16]: ...
+    @property
+    def neighbour_offsets(self) -> Int32: ...
+    @property
+    def neighbours(self) -> Int32: ...
+    @property
+    def block_offsets(self) -> Int32: ...
+    @property
+    def block_vertices(self) -> Int32: ...
+    @property
+    def colour_offsets(self) -> Int32: ...
+    @property
+    def colour_blocks(self) -> Int32: ...
+
+def match_facets(simplices: Int32, n: int) -> tuple[Int32, int]:
+    """Mates (m, d+1), and a corner whose facet is shared by too many simplices or -1."""
+
+def orient(simplices: Int32, mates: Int32) -> tuple[Int32, NDArray[np.uint8], bool]:
+    """Component (m,), against (m,) and whether the mesh is orientable."""
+
+def check(points: Float64, simplices: Int32, threads: int) -> tuple[int, float]:
+    """Number of invalid simplices and the smallest signed measure."""
+
+def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
+    """Signed measure and validity, each (m,)."""
+
+def angles(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, Float64]:
+    """Smallest and largest (dihedral) angle in radians, each (m,)."""
+
+def relocate(
+    move: int,
+    points: Float64,
+    movable: NDArray[np.bool_],
+    stars: Stars,
+    blocks: Int32,
+    threshold_sine2: float,
+    only_invalid: bool,
+    threads: int,
+) -> tuple[int, int]:
+    """Relocate, in place, the movable vertices of some blocks of one colour; the numbers visited and moved."""
+
+def linear_program(neighbours: Float64, faces: NDArray[np.uint16]) -> tuple[int, Float64, Float64, int]:
+    """Status (0 optimal, 1 degenerate, 2 failed), (x, t), dual weights of faces and box sides, pivots."""
+
+def min_norm_point(vectors: Float64) -> Float64:
+    """Return the point of smallest norm in the convex hull of the rows."""
+
+def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[Float64, Float64, float]:
+    """Sines of a star, their gradients, and sign * (smallest sine)^2 (-1 where the star is not valid)."""

@@ -1,0 +1,23 @@
+"""What can go wrong, in one sentence each.
+
+MeshfixError
+├── InvalidMeshError    the arrays are not a triangle or tetrahedral mesh that can be worked on
+├── ReadError           the file cannot be read, or holds no such mesh
+└── WriteError          the result cannot be written
+"""
+
+
+class MeshfixError(Exception):
+    """Base of all errors; its text is one clear line for the user."""
+
+
+class InvalidMeshError(MeshfixError):
+    """The arrays are not a triangle or tetrahedral mesh that can be worked on."""
+
+
+class ReadError(MeshfixError):
+    """The file cannot be read, or holds no triangle or tetrahedral mesh."""
+
+
+class WriteError(MeshfixError):
+    """The result cannot be written; nothing was."""

@@ -1,0 +1,242 @@
+// The one binding file. Python checks shapes, indices and finiteness before it calls; nothing here throws because
+// of data, but for a star too large to number. d = 2 or 3 is read off the arrays.
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/tuple.h>
+
+#include "measures.hpp"
+#include "relocate.hpp"
+#include "stars.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace meshfix;
+
+namespace {
+
+template <class T>
+using Matrix = nb::ndarray<T, nb::numpy, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+template <class T>
+using Vector = nb::ndarray<T, nb::numpy, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+// Hands the memory of a vector to numpy.
+template <class T>
+nb::capsule keep(std::vector<T>&& values, T*& data) {
+    auto* owned = new std::vector<T>(std::move(values));
+    data = owned->data();
+    return nb::capsule(owned, [](void* p) noexcept { delete static_cast<std::vector<T>*>(p); });
+}
+
+template <class T>
+Vector<T> to_numpy(std::vector<T>&& values) {
+    const std::size_t size = values.size();
+    T* data = nullptr;
+    const nb::capsule owner = keep(std::move(values), data);
+    return Vector<T>(data, {size}, owner);
+}
+
+template <class T>
+Matrix<T> to_numpy(std::vector<T>&& values, std::size_t columns) {
+    const std::size_t rows = values.size() / columns;
+    T* data = nullptr;
+    const nb::capsule owner = keep(std::move(values), data);
+    return Matrix<T>(data, {rows, columns}, owner);
+}
+
+// Calls f with the dimension as a compile-time constant, without the interpreter lock.
+template <class F>
+auto with_dimension(std::size_t d, const F& f) {
+    if (d != 2 && d != 3) throw nb::value_error("the dimension must be 2 or 3");
+    const nb::gil_scoped_release release;
+    return d == 2 ? f(std::integral_constant<int, 2>{}) : f(std::integral_constant<int, 3>{});
+}
+
+struct PyStars {
+    int dimension;
+    Stars stars;
+};
+
+template <auto Member>
+auto view(PyStars& self) {
+    auto& values = self.stars.*Member;
+    using T = typename std::remove_reference_t<decltype(values)>::value_type;
+    return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+}
+
+// A star given by itself, in its local frame.
+template <int D>
+Star<D> make_star(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces, const double* x) {
+    Star<D> star;
+    for (std::size_t j = 0; j < neighbours.shape(0); ++j) {
+        star.neighbours.push_back(load<D>(neighbours.data() + j * D));
+        star.radius = std::max(star.radius, largest_coordinate(star.neighbours.back()));
+    }
+    star.faces = faces.data();
+    star.faces_count = static_cast<int>(faces.shape(0));
+    star.position = load<D>(x);
+    star.fill_blocks();
+    return star;
+}
+
+auto match_facets_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
+    const std::size_t corners = simplices.shape(1);
+    Facets facets = with_dimension(corners - 1, [&](auto d) {
+        return match_facets<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n);
+    });
+    return std::make_pair(to_numpy(std::move(facets.mates), corners), facets.crowded);
+}
+
+auto orient_py(const Matrix<const std::int32_t>& simplices, const Matrix<const std::int32_t>& mates) {
+    Orientation result = with_dimension(simplices.shape(1) - 1, [&](auto d) {
+        return orient<d>(simplices.data(), mates.data(), static_cast<std::int64_t>(simplices.shape(0)));
+    });
+    return std::make_tuple(to_numpy(std::move(result.component)), to_numpy(std::move(result.against)),
+                           result.orientable);
+}
+
+void init_stars(PyStars* self, const Matrix<const std::int32_t>& simplices, std::int64_t n) {
+    const int dimension = static_cast<int>(simplices.shape(1)) - 1;
+    Stars stars = with_dimension(simplices.shape(1) - 1, [&](auto d) {
+        return build_stars<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n);
+    });
+    new (self) PyStars{dimension, std::move(stars)};
+}
+
+auto relocate_py(int move, const Matrix<double>& points, const Vector<const bool>& movable, const PyStars& stars,
+                 const Vector<const std::int32_t>& blocks, double threshold_sine2, bool only_invalid, int threads) {
+    const Stars& s = stars.stars;
+    if (static_cast<int>(points.shape(1)) != stars.dimension || points.shape(0) + 1 != s.offsets.size() ||
+        movable.shape(0) != points.shape(0))
+        throw nb::value_error("points, movable and stars are not of the same mesh");
+    const Counts counts = with_dimension(points.shape(1), [&](auto d) {
+        const StarsView view{s.offsets.data(), s.faces.data(), s.neighbour_offsets.data(), s.neighbours.data()};
+        return relocate<d>(static_cast<Move>(move), view, points.data(),
+                           reinterpret_cast<const std::uint8_t*>(movable.data()), s.block_offsets.data(),
+                           s.block_vertices.data(), blocks.data(), static_cast<std::int64_t>(blocks.shape(0)),
+                           Parameters{threshold_sine2, only_invalid}, threads);
+    });
+    return std::make_pair(counts.visited, counts.moved);
+}
+
+auto check_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    const Validity total = with_dimension(points.shape(1), [&](auto d) {
+        return check<d>(points.data(), simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), threads);
+    });
+    return std::make_pair(total.inverted, total.min_measure);
+}
+
+auto measure_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    const std::size_t m = simplices.shape(0);
+    std::vector<double> measure(m);
+    std::vector<std::uint8_t> valid(m);
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_simplex<D>(points.data(), simplices.data(), static_cast<std::int64_t>(m), threads,
+                            [&](std::int64_t s, const Edges<D>& e) {
+                                const double det = determinant(e);
+                                measure[s] = det / factorial(D);
+                                valid[s] = is_valid<D>(det, longest_edge2<D>(e));
+                            });
+    });
+    return std::make_pair(to_numpy(std::move(measure)), to_numpy(std::move(valid)));
+}
+
+auto angles_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    const std::size_t m = simplices.shape(0);
+    std::vector<double> smallest(m), largest(m);
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_simplex<D>(points.data(), simplices.data(), static_cast<std::int64_t>(m), threads,
+                            [&](std::int64_t s, const Edges<D>& e) {
+                                const AngleRange range = angles(e);
+                                smallest[s] = range.smallest;
+                                largest[s] = range.largest;
+                            });
+    });
+    return std::make_pair(to_numpy(std::move(smallest)), to_numpy(std::move(largest)));
+}
+
+template <int D>
+auto solve_star(const Star<D>& star) {
+    LinearProgram<D> program;
+    program.set(star);
+    const LpStatus status = program.solve();
+    std::vector<double> weights(star.faces_count + 2 * D, 0.0);
+    if (status != LpStatus::degenerate)
+        for (int row = 0; row <= D; ++row) {
+            const int j = program.basis[row], side = j - program.faces_count;
+            int face = std::min(j, star.faces_count - 1);
+            if (program.column(j) == program.column(program.largest_face)) face = program.largest_face;
+            weights[side < 0 ? face : star.faces_count + side] += program.weight(row);
+        }
+    std::vector<double> pi(program.pi.begin(), program.pi.end());
+    return std::make_tuple(static_cast<int>(status), std::move(pi), std::move(weights), program.pivots);
+}
+
+auto linear_program_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces) {
+    auto [status, pi, weights, pivots] = with_dimension(neighbours.shape(1), [&](auto d) {
+        return solve_star<d>(make_star<d>(neighbours, faces, std::array<double, 3>{}.data()));
+    });
+    return std::make_tuple(status, to_numpy(std::move(pi)), to_numpy(std::move(weights)), pivots);
+}
+
+auto min_norm_point_py(const Matrix<const double>& vectors) {
+    const std::size_t d = vectors.shape(1);
+    return to_numpy(with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        std::vector<Vec<D>> rows;
+        for (std::size_t i = 0; i < vectors.shape(0); ++i) rows.push_back(load<D>(vectors.data() + i * D));
+        const Vec<D> point = min_norm_point<D>(rows);
+        return std::vector<double>(point.begin(), point.end());
+    }));
+}
+
+auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+              const Vector<const double>& x) {
+    const std::size_t d = neighbours.shape(1);
+    auto [values, gradients, smallest] = with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        const Star<D> star = make_star<D>(neighbours, faces, x.data());
+        std::vector<double> values, gradients;
+        for (int i = 0; i < star.faces_count; ++i) {
+            std::array<Sine<D>, functions_per_simplex(D)> functions;
+            sines(star.edges(i, star.position), functions.data());
+            for (const auto& f : functions) {
+                values.push_back(f.value);
+                gradients.insert(gradients.end(), f.gradient.begin(), f.gradient.end());
+            }
+        }
+        return std::make_tuple(values, gradients, min_sine2<D>(star, star.position, 0.0));
+    });
+    return std::make_tuple(to_numpy(std::move(values)), to_numpy(std::move(gradients), d), smallest);
+}
+
+}  // namespace
+
+NB_MODULE(_kernels, m) {
+    m.def("match_facets", &match_facets_py, "simplices"_a.noconvert(), "n"_a);
+    m.def("orient", &orient_py, "simplices"_a.noconvert(), "mates"_a.noconvert());
+    m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "movable"_a.noconvert(), "stars"_a,
+          "blocks"_a.noconvert(), "threshold_sine2"_a, "only_invalid"_a, "threads"_a);
+    m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert());
+    m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
+    m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+
+    nb::class_<PyStars>(m, "Stars")
+        .def("__init__", &init_stars, "simplices"_a.noconvert(), "n"_a)
+        .def_prop_ro("offsets", &view<&Stars::offsets>)
+        .def_prop_ro("incident", &view<&Stars::incident>)
+        .def_prop_ro("faces", &view<&Stars::faces>)
+        .def_prop_ro("neighbour_offsets", &view<&Stars::neighbour_offsets>)
+        .def_prop_ro("neighbours", &view<&Stars::neighbours>)
+        .def_prop_ro("block_offsets", &view<&Stars::block_offsets>)
+        .def_prop_ro("block_vertices", &view<&Stars::block_vertices>)
+        .def_prop_ro("colour_offsets", &view<&Stars::colour_offsets>)
+        .def_prop_ro("colour_blocks", &view<&Stars::colour_blocks>);
+
+    static_assert(static_cast<int>(Move::combined_smooth) == 4, "the codes of untangle.Move");
+}

@@ -1,0 +1,89 @@
+// LANES doubles side by side. The formulas of the kernels are written once, for a scalar T that is double or Pack;
+// the operations are those of IEEE double in each lane, so both give the same bits.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+namespace meshfix {
+
+constexpr int LANES = 2;
+
+#if defined(__GNUC__)
+
+typedef double Pack __attribute__((vector_size(LANES * sizeof(double))));
+typedef std::int64_t PackMask __attribute__((vector_size(LANES * sizeof(double))));
+
+inline Pack select(PackMask mask, Pack a, Pack b) { return mask ? a : b; }
+
+#else
+
+struct PackMask {
+    bool lane[LANES];
+};
+
+struct Pack {
+    double lane[LANES];
+    double& operator[](int i) { return lane[i]; }
+    double operator[](int i) const { return lane[i]; }
+};
+
+template <class F>
+inline Pack lanewise(const F& f) {
+    Pack result;
+    for (int i = 0; i < LANES; ++i) result.lane[i] = f(i);
+    return result;
+}
+template <class F>
+inline PackMask masked(const F& f) {
+    PackMask result;
+    for (int i = 0; i < LANES; ++i) result.lane[i] = f(i);
+    return result;
+}
+inline Pack operator+(Pack a, Pack b) { return lanewise([&](int i) { return a[i] + b[i]; }); }
+inline Pack operator-(Pack a, Pack b) { return lanewise([&](int i) { return a[i] - b[i]; }); }
+inline Pack operator*(Pack a, Pack b) { return lanewise([&](int i) { return a[i] * b[i]; }); }
+inline Pack operator/(Pack a, Pack b) { return lanewise([&](int i) { return a[i] / b[i]; }); }
+inline Pack operator-(Pack a, double b) { return lanewise([&](int i) { return a[i] - b; }); }
+inline Pack operator*(double a, Pack b) { return lanewise([&](int i) { return a * b[i]; }); }
+inline Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
+inline PackMask operator>(Pack a, Pack b) { return masked([&](int i) { return a[i] > b[i]; }); }
+inline PackMask operator<(Pack a, Pack b) { return masked([&](int i) { return a[i] < b[i]; }); }
+inline PackMask operator>(Pack a, double b) { return masked([&](int i) { return a[i] > b; }); }
+inline PackMask operator&(PackMask a, PackMask b) { return masked([&](int i) { return a.lane[i] && b.lane[i]; }); }
+inline Pack select(PackMask m, Pack a, Pack b) { return lanewise([&](int i) { return m.lane[i] ? a[i] : b[i]; }); }
+
+#endif
+
+inline Pack broadcast(double x, const Pack*) {
+    Pack p;
+    for (int i = 0; i < LANES; ++i) p[i] = x;
+    return p;
+}
+
+inline double broadcast(double x, const double*) { return x; }
+inline double select(bool mask, double a, double b) { return mask ? a : b; }
+
+// The constant x as a scalar of type T.
+template <class T>
+inline T constant(double x) {
+    return broadcast(x, static_cast<const T*>(nullptr));
+}
+
+inline double square_root(double x) { return std::sqrt(x); }
+inline Pack square_root(Pack p) {
+    for (int i = 0; i < LANES; ++i) p[i] = std::sqrt(p[i]);
+    return p;
+}
+
+template <class T>
+inline T smaller(T a, T b) {
+    return select(a < b, a, b);
+}
+
+template <class T>
+inline T larger(T a, T b) {
+    return select(a > b, a, b);
+}
+
+}  // namespace meshfix

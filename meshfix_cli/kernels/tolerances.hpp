@@ -1,0 +1,29 @@
+// Every tolerance of the kernels, dimensionless, in one place.
+#pragma once
+
+namespace meshfix {
+
+// A simplex is valid if det > VALID * (longest edge)^d: ten times the rounding error of the determinant.
+constexpr double VALID = 1e-14;
+
+// Linear programme. All are relative to the largest number of their kind in the star.
+constexpr double LP_DROPPED_FACE2 = 1e-24;  // |n|^2 below which co-located neighbours leave the star
+constexpr double LP_RANK = 1e-9;            // residual below which the normals do not span R^d
+constexpr double LP_PRICING = 1e-13;        // reduced cost that still counts as negative
+constexpr double LP_PIVOT = 1e-11;          // pivot element that still counts as positive
+constexpr double LP_BOX = 1.0;              // half width of the box that bounds the vertex, in star sizes
+constexpr int LP_BLAND_AFTER = 20;          // plus one per face: pivots before Bland's rule
+constexpr int LP_MAX_PIVOTS = 1000;         // plus ten per face: never reached with Bland's rule but for rounding
+
+// Active-set method. Function values are sines; lengths are in star sizes.
+constexpr double ACTIVE = 1e-4;           // a sine this close to the smallest is active
+constexpr double ACTIVE_MIN_STEP = 1e-6;  // stopping rule 1
+constexpr int ACTIVE_MAX_STEPS = 20;      // stopping rule 2
+constexpr double ACTIVE_MIN_GAIN = 1e-4;  // stopping rule 3
+constexpr double ACTIVE_KKT = 1e-6;       // stopping rule 4: length of the steepest ascent direction
+constexpr double ACTIVE_ACCEPT = 0.9;     // share of the predicted gain at which a step is taken
+
+// Minimum-norm point: relative optimality gap.
+constexpr double MIN_NORM_GAP = 1e-12;
+
+}  // namespace meshfix

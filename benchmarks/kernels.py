@@ -20,7 +20,7 @@ from meshfix_cli.mesh import Mesh
 from meshfix_cli.untangle import THRESHOLD, Move
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "sample_meshes"))
-import generate  # noqa: E402
+import generate
 
 TARGETS = {Move.LAPLACIAN: 0.05, Move.UNTANGLE: 1.5, Move.COMBINED_SMOOTH: 1.5}  # in 3-D, microseconds
 
@@ -48,7 +48,7 @@ def main() -> None:
     meshes = meshes or [Mesh.build(*generate.plate(0.012)), Mesh.build(*generate.bracket(0.045, 12))]
     table = Table("step", "mesh", "us per vertex", "target", title="kernels, one thread")
     for mesh in meshes:
-        tangled, _ = perturb(mesh, 25, 2 * mesh.mean_edge_length())
+        tangled, _ = perturb(mesh, 25, mesh.mean_edge_length())
         outcome = untangle(tangled, smooth=0)
         name = f"{mesh.dimension}-D, {len(mesh.topology.simplices):,} elements, {int(mesh.movable.sum()):,} free"
         for move in Move:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -183,17 +183,13 @@ class Mesh:
         edges = self.points[stars.neighbours[once]] - self.points[start[once]]
         return float(np.linalg.norm(edges, axis=1).mean())
 
-    def centroids(self, simplices: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Return the centroids (k, d) of the simplices of these numbers."""
-        return self.points[self.topology.simplices[simplices]].mean(axis=1)
-
 
 def _read_only(array: NDArray[_T]) -> NDArray[_T]:
     array.flags.writeable = False
     return array
 
 
-def _checked_simplices(points: NDArray[np.float64], simplices: NDArray[np.generic]) -> NDArray[np.int32]:
+def _checked_simplices(points: NDArray[np.float64], simplices: NDArray[np.integer[Any]]) -> NDArray[np.int32]:
     """Check shapes and indices; return the simplices as (m, d+1) int32."""
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InvalidMeshError(f"points have the shape {points.shape}; (n, 2) or (n, 3) is needed")

@@ -201,8 +201,8 @@ _VERDICT = "Stimpson, Ernst, Knupp, Pebay, Thompson, The Verdict Geometric Quali
 METRICS: dict[str, Metric] = {
     "min_angle": Metric(_min_angle, "min", "smallest angle in degrees, dihedral for tetrahedra", _VERDICT),
     "min_sine": Metric(_min_sine, "min", "smallest sine of an angle, with the sign of the measure", "equation (3.2)"),
-    "aspect_ratio": Metric(_aspect_ratio, "max", "longest edge / inradius, 1 for a regular simplex", _VERDICT),
-    "scaled_jacobian": Metric(_scaled_jacobian, "min", "Jacobian / edges at a corner, 1 for a regular simplex", _VERDICT),
-    "mean_ratio": Metric(_mean_ratio, "min", "Verdict's shape, 1 for a regular simplex, 0 inverted", _VERDICT),
-    "radius_ratio": Metric(_radius_ratio, "max", "circumradius / (d inradius), 1 for a regular simplex", _VERDICT),
+    "aspect_ratio": Metric(_aspect_ratio, "max", "longest edge / inradius, 1 if regular", _VERDICT),
+    "scaled_jacobian": Metric(_scaled_jacobian, "min", "Jacobian / edges of a corner, 1 if regular", _VERDICT),
+    "mean_ratio": Metric(_mean_ratio, "min", "Verdict's shape, 1 if regular, 0 inverted", _VERDICT),
+    "radius_ratio": Metric(_radius_ratio, "max", "circumradius / (d inradius), 1 if regular", _VERDICT),
 }

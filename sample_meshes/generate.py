@@ -133,7 +133,7 @@ def _write_msh(path: Path, points: Points, tets: Simplices, groups: NDArray[np.i
     lines += ["$EndPhysicalNames", "$Nodes", str(len(points))]
     lines += [f"{k + 1} {row}" for k, row in enumerate(_rows(points))]
     lines += ["$EndNodes", "$Elements", str(len(tets))]
-    lines += [f"{k + 1} 4 2 {group} {group} {row}" for k, (group, row) in enumerate(zip(groups, _rows(tets + 1)))]
+    lines += [f"{k + 1} 4 2 {groups[k]} {groups[k]} {row}" for k, row in enumerate(_rows(tets + 1))]
     path.write_text("\n".join([*lines, "$EndElements"]) + "\n")
 
 

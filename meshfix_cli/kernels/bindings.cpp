@@ -167,7 +167,7 @@ auto solve_star(const Star<D>& star) {
         for (int row = 0; row <= D; ++row) {
             const int j = program.basis[row], side = j - program.faces_count;
             int face = std::min(j, star.faces_count - 1);
-            if (program.column(j) == program.column(program.largest_face)) face = program.largest_face;
+            if (program.stand_in >= 0 && program.column(j) == program.column(program.stand_in)) face = program.stand_in;
             weights[side < 0 ? face : star.faces_count + side] += program.weight(row);
         }
     std::vector<double> pi(program.pi.begin(), program.pi.end());

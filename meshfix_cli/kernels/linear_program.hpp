@@ -30,7 +30,8 @@ struct LinearProgram {
     std::vector<Pack> costs;            // c_i
     double box = 0.0;
     int faces_count = 0;                // columns that are faces
-    int largest_face = 0;
+    int stand_in = -1;                  // the face that took the place of those of co-located neighbours, or -1
+    double largest_cost = 0.0;
 
     std::array<int, D + 1> basis{};
     std::array<Column, D + 1> inverse{};  // rows
@@ -43,6 +44,7 @@ struct LinearProgram {
         costs.resize(star.blocks.size());
         box = LP_BOX * star.radius;
         faces_count = static_cast<int>(star.blocks.size()) * LANES;
+        Pack shortest = constant<Pack>(INFINITY), longest = constant<Pack>(0.0), cost = constant<Pack>(box);
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto& p = star.blocks[b];
             costs[b] = determinant(p);
@@ -51,16 +53,25 @@ struct LinearProgram {
             } else {
                 normals[b] = cross(p[1] - p[0], p[2] - p[0]);
             }
+            shortest = smaller(shortest, norm2(normals[b]));
+            longest = larger(longest, norm2(normals[b]));
+            cost = larger(cost, larger(costs[b], costs[b] * constant<Pack>(-1.0)));
         }
-        drop_small_faces();
+        double shortest2 = INFINITY, longest2 = 0.0;
+        largest_cost = box;
+        for (int i = 0; i < LANES; ++i) {
+            shortest2 = std::min(shortest2, shortest[i]);
+            longest2 = std::max(longest2, longest[i]);
+            largest_cost = std::max(largest_cost, cost[i]);
+        }
+        stand_in = -1;
+        if (!(shortest2 > LP_DROPPED_FACE2 * longest2)) drop_faces(LP_DROPPED_FACE2 * longest2);
     }
 
     // The position is pi[0..D-1], the smallest determinant there pi[D].
     LpStatus solve() {
         pivots = 0;
         start();
-        double largest_cost = box;
-        for (int j = 0; j < faces_count; ++j) largest_cost = std::max(largest_cost, std::fabs(cost(j)));
         const int limit = LP_MAX_PIVOTS + 10 * faces_count;
         for (; pivots < limit; ++pivots) {
             const bool bland = pivots >= LP_BLAND_AFTER + faces_count;
@@ -96,15 +107,14 @@ struct LinearProgram {
     }
 
     // The face of co-located neighbours says nothing: the largest face takes its place.
-    void drop_small_faces() {
-        largest_face = 0;
+    void drop_faces(double smallest) {
+        stand_in = 0;
         for (int j = 1; j < faces_count; ++j)
-            if (norm2(normal(j)) > norm2(normal(largest_face))) largest_face = j;
-        const double smallest = LP_DROPPED_FACE2 * norm2(normal(largest_face));
+            if (norm2(normal(j)) > norm2(normal(stand_in))) stand_in = j;
         for (int j = 0; j < faces_count; ++j) {
             if (norm2(normal(j)) > smallest) continue;
-            for (int k = 0; k < D; ++k) normals[j / LANES][k][j % LANES] = normal(largest_face)[k];
-            costs[j / LANES][j % LANES] = cost(largest_face);
+            for (int k = 0; k < D; ++k) normals[j / LANES][k][j % LANES] = normal(stand_in)[k];
+            costs[j / LANES][j % LANES] = cost(stand_in);
         }
     }
 
@@ -157,7 +167,11 @@ struct LinearProgram {
         }
     }
 
-    bool is_basic(int j) const { return std::find(basis.begin(), basis.end(), j) != basis.end(); }
+    bool is_basic(int j) const {
+        bool basic = false;
+        for (const int b : basis) basic |= b == j;
+        return basic;
+    }
 
     // Largest coefficient, or Bland's first index; -1: optimal. A basic column never enters again.
     int choose_entering(double tolerance, bool bland) const {
@@ -204,18 +218,15 @@ struct LinearProgram {
         Column w;
         for (int row = 0; row <= D; ++row) w[row] = dot(inverse[row], a);
         const double tolerance = LP_PIVOT * largest_coordinate(w);
-        int leaving = -1;
-        double best = INFINITY;
-        for (int row = 0; row <= D; ++row) {
-            if (!(w[row] > tolerance)) continue;
-            const double ratio = inverse[row][D] / w[row];
-            const bool tie = leaving >= 0 && ratio == best;
-            if (ratio < best || (tie && (bland ? basis[row] < basis[leaving] : w[row] > w[leaving]))) {
-                best = ratio;
-                leaving = row;
-            }
+        Column ratios;
+        for (int row = 0; row <= D; ++row) ratios[row] = w[row] > tolerance ? inverse[row][D] / w[row] : INFINITY;
+        int leaving = 0;
+        for (int row = 1; row <= D; ++row) {
+            const bool first = bland ? basis[row] < basis[leaving] : w[row] > w[leaving];
+            const bool sooner = (ratios[row] < ratios[leaving]) | ((ratios[row] == ratios[leaving]) & first);
+            leaving = sooner ? row : leaving;
         }
-        if (leaving < 0) return false;
+        if (!(ratios[leaving] < INFINITY)) return false;
         const double pivot = 1.0 / w[leaving];
         for (int k = 0; k <= D; ++k) inverse[leaving][k] *= pivot;
         for (int row = 0; row <= D; ++row) {

@@ -1,0 +1,327 @@
+"""Path or stream <-> Mesh. The only importer of meshio."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import MeshfixError, ReadError, WriteError
+from meshfix_cli.mesh import CELL_NAMES, Mesh
+from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile.atomic import check_target, write_file
+from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.plane import plane_basis
+
+__all__ = ["Document", "check_target", "output_format", "read", "write"]
+
+REGION_ARRAYS = ("gmsh:physical", "medit:ref", "cell_tags")
+SIMPLEX = {3: "tetra", 2: "triangle"}
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """A mesh as it came from a file, and all that is needed to write it back.
+
+    Attributes
+    ----------
+    name : str
+        The path, or "<stdin>".
+    mesh : Mesh
+    format : Format
+    ids : (m,) int64
+        For each simplex of the mesh its position among all cells of the file, from 0.
+    fixed : dict
+        Number of vertices held for each reason; a vertex counts for the first that applies.
+    notes : tuple of str
+        What a user should know about the file, a sentence each.
+    source : meshio.Mesh
+    basis : (2, 3) float64 or None
+        Spans the plane of a planar mesh in space.
+    """
+
+    name: str
+    mesh: Mesh
+    format: Format
+    ids: NDArray[np.int64]
+    fixed: dict[str, int]
+    notes: tuple[str, ...]
+    source: Any = field(repr=False)
+    basis: NDArray[np.float64] | None
+
+    def file_points(self, mesh: Mesh) -> NDArray[np.floating[Any]]:
+        """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
+        original = self.source.points
+        if original.dtype.kind != "f":
+            original = original.astype(np.float64)
+        points: NDArray[np.floating[Any]] = original.copy()
+        moved = (mesh.points != self.mesh.points).any(axis=1)
+        if self.basis is None:
+            points[moved] = mesh.points[moved]
+        elif np.isin(self.basis, (0.0, 1.0)).all():
+            points[np.ix_(moved, self.basis.argmax(axis=1))] = mesh.points[moved]
+        else:
+            points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
+        return points
+
+    def as_stored(self, mesh: Mesh) -> Mesh:
+        """Return a moved mesh with the coordinates rounded as the file will hold them."""
+        points = self.file_points(mesh).astype(np.float64)
+        stored = points if self.basis is None else points @ self.basis.T
+        return mesh.with_points(np.ascontiguousarray(stored))
+
+
+def read(path: str | os.PathLike[str], fix: str | None = None, regions: str | None = None) -> Document:
+    """Read a triangle or tetrahedral mesh.
+
+    Parameters
+    ----------
+    path : str or path
+        "-" reads stdin.
+    fix : str, optional
+        Name of a point-data array; vertices where it is not zero are held.
+    regions : str, optional
+        Name of a cell-data array; the interface between regions is held. Default: those of `REGION_ARRAYS`.
+
+    Raises
+    ------
+    ReadError
+        The file cannot be read, holds no mesh of simplices, or not the arrays named.
+    InvalidMeshError
+        See `Mesh.build`.
+    """
+    name = "<stdin>" if os.fspath(path) == "-" else os.fspath(path)
+    try:
+        source, form = _read_stdin() if name == "<stdin>" else _read_path(Path(path))
+        return _document(name, source, form, fix, regions)
+    except MeshfixError as error:
+        text = str(error)
+        raise type(error)(text if text.startswith(name) else f"{name}: {text}") from error
+
+
+def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: Format | None = None) -> None:
+    """Write a moved mesh; the rest of the document is written as it came.
+
+    Parameters
+    ----------
+    document : Document
+    mesh : Mesh
+        Made of `document.mesh` by moving vertices.
+    target : str or path
+        Replaced at once or not at all; "-" writes to stdout.
+    form : Format, optional
+        Default: see `output_format`.
+
+    Raises
+    ------
+    WriteError
+        Nothing was written.
+    """
+    import meshio
+
+    target = os.fspath(target)
+    form = form or output_format(document, target)
+    check_target(target)
+    out = document.source.copy()
+    out.points = document.file_points(mesh)
+
+    def produce(temporary: Path) -> None:
+        try:
+            with _quiet():
+                meshio.write(temporary, out, file_format=form.name, **formats.options(form))
+        except ImportError as error:
+            raise WriteError(f"{target}: the format {form.name} needs the package {error.name}") from error
+        except OSError:
+            raise
+        except (Exception, SystemExit) as error:  # meshio's writers raise whatever they meet
+            raise WriteError(f"{target}: cannot be written as {form.name}: {_first_line(error)}") from error
+
+    write_file(target, Path(target).suffix if target != "-" else f".{form.name}", produce)
+
+
+def output_format(document: Document, target: str, name: str | None = None) -> Format:
+    """Return the format of the output: the one named, else that of the target's extension, else the input's.
+
+    Raises
+    ------
+    WriteError
+        The extension is not known, or the format cannot be written.
+    """
+    if name is not None:
+        form = Format(name)
+    elif target == "-" or not Path(target).suffix:
+        form = document.format
+    else:
+        known = formats.by_name(Path(target))
+        if known is None:
+            raise WriteError(f"{target}: no mesh format has the extension {Path(target).suffix!r}")
+        form = known
+    if form.reader == document.format.reader and name is None:
+        form = document.format
+    elif form.binary is None and form.name in ("vtk", "vtk42", "gmsh", "gmsh22", "ply", "stl", "vtu"):
+        form = Format(form.name, bool(document.format.binary))
+    if form.name not in formats.writers():
+        raise WriteError(f"{target}: the format {form.name} cannot be written")
+    return form
+
+
+def _read_stdin() -> tuple[Any, Format]:
+    data = sys.stdin.buffer.read()
+    if not data:
+        raise ReadError("<stdin>: is empty")
+    form = formats.sniff(data[: formats.HEAD])
+    if form is None:
+        raise ReadError("<stdin>: the format is not recognised")
+    with tempfile.TemporaryDirectory(prefix="meshfix-") as folder:
+        path = Path(folder) / "stdin"
+        path.write_bytes(data)
+        return _read_with_meshio(path, form), form
+
+
+def _read_path(path: Path) -> tuple[Any, Format]:
+    try:
+        with path.open("rb") as file:
+            head = file.read(formats.HEAD)
+    except OSError as error:
+        raise ReadError(f"{path}: {error.strerror}") from error
+    if not head:
+        raise ReadError(f"{path}: is empty")
+    form = formats.sniff(head) or formats.by_name(path)
+    if form is None:
+        raise ReadError(f"{path}: the format is not recognised")
+    return _read_with_meshio(path, form), form
+
+
+def _read_with_meshio(path: Path, form: Format) -> Any:
+    import meshio
+
+    try:
+        with _quiet():
+            return meshio.read(path, file_format=form.reader)
+    except ImportError as error:
+        raise ReadError(f"the format {form.name} needs the package {error.name}") from error
+    except (Exception, SystemExit) as error:  # meshio's readers raise whatever they meet, and exit
+        raise ReadError(f"is not a readable {form.name} file ({_first_line(error)})") from error
+
+
+@contextlib.contextmanager
+def _quiet() -> Any:
+    """Swallow what meshio prints."""
+    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+        yield
+
+
+def _first_line(error: BaseException) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[0] if lines else type(error).__name__
+
+
+def _document(name: str, source: Any, form: Format, fix: str | None, regions: str | None) -> Document:
+    dimension = _dimension(source)
+    starts = np.cumsum([0, *(len(block.data) for block in source.cells)])
+    chosen = [i for i, block in enumerate(source.cells) if block.type == SIMPLEX[dimension]]
+    simplices = np.concatenate([source.cells[i].data for i in chosen])
+    ids = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in chosen])
+
+    points, basis = _solved_points(source, simplices, dimension)
+    held = {"on cells of another kind": _on_other_cells(source, chosen, len(points))}
+    if fix is not None:
+        held[f"by --fix {fix}"] = _fixed_by(source, fix)
+    mesh = Mesh.build(points, simplices)
+    topology = mesh.topology
+    reasons = {"on the boundary": topology.boundary}
+    for key in _region_arrays(source, regions):
+        labels = np.concatenate([source.cell_data[key][i] for i in chosen])
+        reasons[f"between regions of {key}"] = topology.interface(labels[topology.source])
+    fixed = {}
+    for reason, mask in {**reasons, **held}.items():
+        counted = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
+        fixed[reason] = int(counted.sum())
+        mesh = mesh.with_fixed(mask)
+    notes = _notes(mesh, len(simplices))
+    return Document(name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, basis)
+
+
+def _dimension(source: Any) -> int:
+    """3 where there are tetrahedra, 2 where triangles are the cells of the highest dimension."""
+    types = [block.type for block in source.cells if len(block.data)]
+    if "tetra" in types:
+        return 3
+    solid = sorted({block.type for block in source.cells if len(block.data) and block.dim == 3})
+    if "triangle" in types and not solid:
+        return 2
+    found = ", ".join(solid or sorted(set(types))) or "none"
+    raise ReadError(f"there are no tetrahedra and no plane mesh of triangles in it (cells: {found})")
+
+
+def _solved_points(
+    source: Any, simplices: NDArray[np.int64], dimension: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    points = np.asarray(source.points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or points.shape[1] < dimension:
+        raise ReadError(f"its points have {points.shape[-1]} coordinates")
+    if points.shape[1] == dimension:
+        return points, None
+    if simplices.size and (simplices.min() < 0 or simplices.max() >= len(points)):
+        return points[:, :2], None  # Mesh.build says which
+    used = points[np.unique(simplices)]
+    if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
+        return points[:, :2], None  # likewise
+    basis = plane_basis(used)
+    with np.errstate(invalid="ignore"):  # isolated points may be anything
+        return points @ basis.T, basis
+
+
+def _on_other_cells(source: Any, chosen: list[int], n: int) -> NDArray[np.bool_]:
+    """Vertices of cells that are not solved for: lines, boundary triangles, quadrilaterals, ..."""
+    mask = np.zeros(n, dtype=bool)
+    for i, block in enumerate(source.cells):
+        if i in chosen:
+            continue
+        for row in [block.data] if isinstance(block.data, np.ndarray) and block.data.ndim == 2 else block.data:
+            vertices = np.asarray(row, dtype=np.int64)
+            mask[vertices[(vertices >= 0) & (vertices < n)]] = True
+    return mask
+
+
+def _fixed_by(source: Any, name: str) -> NDArray[np.bool_]:
+    if name not in source.point_data:
+        known = ", ".join(sorted(source.point_data)) or "none"
+        raise ReadError(f"there is no point data named {name!r} (found: {known})")
+    values = np.asarray(source.point_data[name])
+    return (values.reshape(len(values), -1) != 0).any(axis=1)
+
+
+def _region_arrays(source: Any, name: str | None) -> list[str]:
+    if name is None:
+        return [key for key in REGION_ARRAYS if key in source.cell_data]
+    if name not in source.cell_data:
+        known = ", ".join(sorted(source.cell_data)) or "none"
+        raise ReadError(f"there is no cell data named {name!r} (found: {known})")
+    return [name]
+
+
+def _notes(mesh: Mesh, rows: int) -> tuple[str, ...]:
+    topology, cells = mesh.topology, CELL_NAMES[mesh.dimension][1]
+    notes = []
+    if len(topology.simplices) < rows:
+        notes.append(f"{rows - len(topology.simplices):,} {cells} are listed more than once; each counts once")
+    isolated = topology.n - int(topology.used.sum())
+    if isolated:
+        notes.append(f"{isolated:,} points belong to no element and are kept as they are")
+    components = int(topology.component.max()) + 1
+    mirrored = topology.mirrored_components
+    if mirrored:
+        which = "all elements are" if components == 1 else f"{mirrored:,} of {components:,} components are"
+        notes.append(f"{which} numbered the other way round (mirrored); solved so, the numbering is kept")
+    if not mesh.movable.any():
+        notes.append("no vertex is free to move")
+    return tuple(notes)

@@ -1,0 +1,73 @@
+"""Writing that never leaves half a file."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from meshfix_cli.errors import WriteError
+
+
+def check_target(target: str) -> None:
+    """Raise WriteError now, before any work, where writing to `target` cannot succeed."""
+    if target == "-":
+        return
+    path = Path(target)
+    if path.is_dir():
+        raise WriteError(f"{target}: is a directory")
+    if not path.resolve().parent.is_dir():
+        raise WriteError(f"{target}: the directory does not exist")
+    if _is_special(path):
+        return
+    if not os.access(path.resolve().parent, os.W_OK):
+        raise WriteError(f"{target}: the directory is not writable")
+
+
+def write_file(target: str, suffix: str, produce: Callable[[Path], None]) -> None:
+    """Let `produce` write a temporary file, then put it in the place of `target` at once ("-": stdout).
+
+    The temporary file is in the target's directory, so the replacement is one rename; symbolic links are
+    followed and the mode of an existing file is kept.
+    """
+    path = Path(target).resolve()
+    streamed = target == "-" or _is_special(path)
+    handle, name = tempfile.mkstemp(prefix=".meshfix-", suffix=suffix, dir=None if streamed else path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        produce(temporary)
+        if target == "-":
+            sys.stdout.buffer.write(temporary.read_bytes())
+            sys.stdout.buffer.flush()
+        elif streamed:
+            path.write_bytes(temporary.read_bytes())
+        else:
+            _replace(temporary, path)
+    except BrokenPipeError:  # nobody reads stdout any more: the command line knows what that means
+        raise
+    except OSError as error:
+        raise WriteError(f"{target}: {error.strerror or error}") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _replace(temporary: Path, path: Path) -> None:
+    temporary.chmod(stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask())
+    with temporary.open("rb") as written:
+        os.fsync(written.fileno())
+    temporary.replace(path)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _is_special(path: Path) -> bool:
+    """A pipe or a device: written to, never replaced."""
+    return path.exists() and not path.is_file()

@@ -1,0 +1,250 @@
+"""Results -> a rich table for people or JSON for programs. The only importer of rich."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from meshfix_cli.mesh import CELL_NAMES, Mesh
+from meshfix_cli.quality import BIN_WIDTH, Summary
+
+if TYPE_CHECKING:
+    from meshfix_cli.untangle import SweepRecord
+
+SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
+LISTED = 10  # inverted elements named in the report
+
+_BARS = " ▁▂▃▄▅▆▇█"
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """All facts about one run, from which the table and the JSON are made.
+
+    Attributes
+    ----------
+    name, command : str
+    mesh : Mesh
+        The result, as the file stores it.
+    points : (n, 2) or (n, 3) float
+        The result in the coordinates of the file.
+    ids : (m,) int64
+        The file's numbers of the simplices.
+    stages : dict
+        Summaries by name in the order of the table's columns; the last is that of the result.
+    ceiling : float or None
+        Degrees; the smallest angle that fixed vertices set.
+    fixed : dict
+        Number of fixed vertices by reason.
+    records : sequence of SweepRecord
+    notes : sequence of str
+    facts : dict
+        Whatever else the command has to tell, under stable names.
+    """
+
+    name: str
+    command: str
+    mesh: Mesh
+    points: NDArray[np.floating[Any]]
+    ids: NDArray[np.int64]
+    stages: dict[str, Summary]
+    ceiling: float | None
+    fixed: dict[str, int]
+    records: Sequence[SweepRecord] = ()
+    notes: Sequence[str] = ()
+    facts: Mapping[str, Any] | None = None
+
+    @property
+    def result(self) -> Summary:
+        """The summary of the result."""
+        return list(self.stages.values())[-1]
+
+    @property
+    def misnumbered(self) -> int:
+        """Elements numbered against their neighbours: inverted for whoever reads the file, whatever their shape."""
+        return int(self.mesh.topology.mixed_numbering.sum())
+
+    @property
+    def valid(self) -> bool:
+        """No element is inverted, by shape or by numbering."""
+        return self.result.inverted == 0 and self.misnumbered == 0
+
+
+def console(stream: Any = None) -> Console:
+    """Return a console for a stream; plain text of 100 columns where that is not a terminal."""
+    stream = stream or sys.stdout
+    if hasattr(stream, "reconfigure"):
+        stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
+    return Console(file=stream, width=None if stream.isatty() else 100, highlight=False)
+
+
+def print_report(report: Report, out: Console) -> None:
+    """Print the quality table, the phases, the notes and a verdict in plain words."""
+
+    def line(text: str, style: str = "") -> None:
+        out.print(Text(text, style=style), soft_wrap=True)
+
+    line(_title(report))
+    out.print(_quality_table(report))
+    if report.records:
+        line(_phases(report.records))
+    for note in report.notes:
+        line(f"note: {note}")
+    for text in _verdict(report):
+        line(text, "bold green" if report.valid else "bold red")
+
+
+def print_json(report: Report, out: Console) -> None:
+    """Print one JSON object, on one line."""
+    out.file.write(json.dumps(to_json(report), allow_nan=False) + "\n")
+
+
+def to_json(report: Report) -> dict[str, Any]:
+    """Return the facts of the table under stable names; angles in degrees, times in seconds, lengths of the model."""
+    mesh = report.mesh
+    return {
+        "schema": SCHEMA,
+        "command": report.command,
+        "file": report.name,
+        "dimension": mesh.dimension,
+        "elements": len(mesh.topology.simplices),
+        "vertices": int(mesh.topology.used.sum()),
+        "free_vertices": int(mesh.movable.sum()),
+        "fixed": report.fixed,
+        "valid": report.valid,
+        "misnumbered": report.misnumbered,
+        "ceiling": report.ceiling,
+        "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
+        "inverted_elements": [{"id": i, "centroid": c} for i, c in _listed(report)],
+        "sweeps": [asdict(record) for record in report.records],
+        "notes": list(report.notes),
+        **(report.facts or {}),
+    }
+
+
+def history_csv(records: Iterable[SweepRecord]) -> str:
+    """Return a line for each sweep: the series of the paper's figure 4.4."""
+    rows = [asdict(record) for record in records]
+    lines = [",".join(rows[0])] if rows else []
+    return "\n".join(lines + [",".join(str(value) for value in row.values()) for row in rows]) + "\n"
+
+
+def with_progress(run: Iterable[tuple[Mesh, SweepRecord]], out: Console) -> Iterator[tuple[Mesh, SweepRecord]]:
+    """Pass the steps through and show each on a terminal as it comes; the line is gone at the end."""
+    if not out.is_terminal:
+        yield from run
+        return
+    with out.status("reading the stars") as status:
+        for mesh, record in run:
+            status.update(f"{record.phase} {record.sweep}: {record.inverted:,} inverted")
+            yield mesh, record
+
+
+def _summary_json(summary: Summary) -> dict[str, Any]:
+    values = {
+        "inverted": summary.inverted,
+        "folded": summary.folded,
+        "min_measure": summary.min_measure,
+        "min_angle": summary.min_angle,
+        "max_angle": summary.max_angle,
+        "mean_min_angle": summary.mean_min_angle,
+        "percentile_1": summary.percentile_1,
+        "histogram": {"bin_width": BIN_WIDTH, "counts": list(summary.histogram)},
+    }
+    finite = {name: [_finite(v) for v in pair] for name, pair in summary.metrics.items()}
+    return {**values, "metrics": {name: {"worst": w, "mean": m} for name, (w, m) in finite.items()}}
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity, which is the aspect ratio of an inverted element."""
+    return value if abs(value) < float("inf") else None
+
+
+def _title(report: Report) -> str:
+    mesh = report.mesh
+    cells, held = CELL_NAMES[mesh.dimension][1], ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
+    vertices, free = int(mesh.topology.used.sum()), int(mesh.movable.sum())
+    return f"{report.name}: {len(mesh.topology.simplices):,} {cells}, {vertices:,} vertices: {free:,} free" + (
+        f", fixed {held}" if held else ""
+    )
+
+
+def _quality_table(report: Report) -> Table:
+    mesh, stages = report.mesh, report.stages
+    angle = "angle" if mesh.dimension == 2 else "dihedral angle"
+    table = Table("")
+    for stage in stages:
+        table.add_column(stage, justify="right")
+
+    def row(label: str, form: str, field: str) -> None:
+        table.add_row(label, *(format(getattr(summary, field), form) for summary in stages.values()))
+
+    row("inverted elements", ",", "inverted")
+    row("folded interior faces" if mesh.dimension == 3 else "folded interior edges", ",", "folded")
+    row("smallest area" if mesh.dimension == 2 else "smallest volume", ".3g", "min_measure")
+    row(f"smallest {angle} [°]", ".3f", "min_angle")
+    row(f"largest {angle} [°]", ".3f", "max_angle")
+    row(f"mean smallest {angle} [°]", ".2f", "mean_min_angle")
+    row("1st percentile [°]", ".2f", "percentile_1")
+    if report.ceiling is not None:
+        blank = [""] * (len(stages) - 1)
+        table.add_row("ceiling set by fixed vertices [°]", *blank, f"{report.ceiling:.3f}")
+    for name in report.result.metrics:
+        worst = [f"{summary.metrics[name][0]:.3g} / {summary.metrics[name][1]:.3g}" for summary in stages.values()]
+        table.add_row(f"{name}, worst / mean", *worst)
+    width = len(report.result.histogram) * BIN_WIDTH
+    table.add_row(f"smallest angles, 0 to {width:.0f}°", *(_bars(summary.histogram) for summary in stages.values()))
+    return table
+
+
+def _bars(histogram: Sequence[int]) -> str:
+    """One character a bin; any element at all shows."""
+    top = max(histogram) or 1
+    return "".join(_BARS[-(-count * (len(_BARS) - 1) // top)] for count in histogram)
+
+
+def _phases(records: Sequence[SweepRecord]) -> str:
+    """Sweeps and seconds of each phase, in order."""
+    phases: dict[str, list[float]] = {}
+    for record in records:
+        if record.sweep and record.phase != "best":
+            phases.setdefault(record.phase, []).append(record.seconds)
+    parts = [f"{name}: {len(t)} sweep{'s' * (len(t) > 1)}, {sum(t):.3g} s" for name, t in phases.items()]
+    return "; ".join(parts)
+
+
+def _verdict(report: Report) -> list[str]:
+    lines = [_perturbed(report.facts)] if report.facts and "moved" in report.facts else []
+    count = report.result.inverted
+    if report.valid:
+        return [*lines, "valid: no element is inverted"]
+    if count:
+        verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
+        text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
+        lines.append(text + (f"; the first {LISTED}:" if count > LISTED else ":"))
+        lines += [f"  cell {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
+    if report.misnumbered:
+        lines.append(
+            f"NOT VALID: {report.misnumbered:,} elements are numbered against their neighbours;"
+            " meshfix keeps the numbering"
+        )
+    return lines
+
+
+def _perturbed(facts: Mapping[str, Any]) -> str:
+    return f"moved {facts['moved']:,} vertices by {facts['distance']:.6g} (seed {facts['seed']})"
+
+
+def _listed(report: Report) -> list[tuple[int, list[float]]]:
+    first = report.result.inverted_elements[:LISTED]
+    centroids = report.points[report.mesh.topology.simplices[first]].mean(axis=1)
+    return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]

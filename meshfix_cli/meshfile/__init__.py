@@ -132,6 +132,8 @@ def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: 
     check_target(target)
     out = document.source.copy()
     out.points = document.file_points(mesh)
+    if not _keeps_entities(out):
+        out.point_data.pop("gmsh:dim_tags", None)
 
     def produce(temporary: Path) -> None:
         try:
@@ -205,11 +207,34 @@ def _read_with_meshio(path: Path, form: Format) -> Any:
 
     try:
         with _quiet():
-            return meshio.read(path, file_format=form.reader)
+            source = _native(meshio.read(path, file_format=form.reader))
+            missing = formats.missing_part(path, form, sum(len(block.data) for block in source.cells))
     except ImportError as error:
         raise ReadError(f"the format {form.name} needs the package {error.name}") from error
     except (Exception, SystemExit) as error:  # meshio's readers raise whatever they meet, and exit
         raise ReadError(f"is not a readable {form.name} file ({_first_line(error)})") from error
+    if missing:
+        raise ReadError(f"is truncated: {missing}")
+    return source
+
+
+def _keeps_entities(source: Any) -> bool:
+    """Whether meshio can write gmsh's geometric entities: not without a physical group."""
+    return "gmsh:dim_tags" not in source.point_data or "gmsh:physical" in source.cell_data
+
+
+def _native(source: Any) -> Any:
+    """Turn arrays to the machine's byte order: readers of binary files leave them as they were there."""
+
+    def native(array: Any) -> Any:
+        return array.astype(array.dtype.newbyteorder("=")) if isinstance(array, np.ndarray) else array
+
+    source.points = native(source.points)
+    for block in source.cells:
+        block.data = native(block.data)
+    source.point_data = {name: native(data) for name, data in source.point_data.items()}
+    source.cell_data = {name: [native(data) for data in blocks] for name, blocks in source.cell_data.items()}
+    return source
 
 
 @contextlib.contextmanager
@@ -247,6 +272,8 @@ def _document(name: str, source: Any, form: Format, fix: str | None, regions: st
         fixed[reason] = int(counted.sum())
         mesh = mesh.with_fixed(mask)
     notes = _notes(mesh, len(simplices))
+    if not _keeps_entities(source):
+        notes += ("gmsh's geometric entities are not written back (the file has no physical group)",)
     return Document(name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, basis)
 
 
@@ -270,11 +297,12 @@ def _solved_points(
         raise ReadError(f"its points have {points.shape[-1]} coordinates")
     if points.shape[1] == dimension:
         return points, None
-    if simplices.size and (simplices.min() < 0 or simplices.max() >= len(points)):
-        return points[:, :2], None  # Mesh.build says which
+    flat = np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
+    if simplices.min() < 0 or simplices.max() >= len(points):
+        return flat, None  # Mesh.build tells what is wrong, here and below
     used = points[np.unique(simplices)]
     if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
-        return points[:, :2], None  # likewise
+        return flat, None
     basis = plane_basis(used)
     with np.errstate(invalid="ignore"):  # isolated points may be anything
         return points @ basis.T, basis

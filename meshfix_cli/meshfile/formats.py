@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +49,24 @@ def sniff(head: bytes) -> Format | None:
         return Format("abaqus")
     if re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE) and re.match(r"(#|o |g |v |mtllib )", text):
         return Format("obj")
+    return None
+
+
+def missing_part(path: Path, form: Format, cells: int) -> str | None:
+    """Say what a file announces but does not hold; meshio reads some truncated files without a word.
+
+    `cells` is the number of cells that were read.
+    """
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        if form.reader == "gmsh":
+            for section in (b"Nodes", b"Elements"):
+                if data.find(b"$" + section) >= 0 > data.find(b"$End" + section):
+                    return f"the section ${section.decode()} does not end"
+        start = data.find(b"\nCELLS ") if form.reader == "vtk" else -1
+        if start >= 0:
+            announced = int(data[start + 7 : start + 40].split()[0]) - (form.name == "vtk")
+            if announced != cells:
+                return f"it announces {announced:,} cells and holds {cells:,}"
     return None
 
 

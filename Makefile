@@ -1,0 +1,53 @@
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+KERNELS := $(wildcard meshfix_cli/kernels/*)
+
+.PHONY: help demo test lint check sanitize bench tables samples clean
+
+help: ## show this list
+	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
+
+# The package installed in place, so that changes of Python files need no new installation; those of kernels do.
+$(VENV)/installed: pyproject.toml $(KERNELS)
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' \
+	  --config-settings=cmake.define.MESHFIX_WERROR=ON
+	touch $@
+
+demo: $(VENV)/installed ## install in .venv, tangle a 3-D sample and repair it
+	@mkdir -p out
+	$(BIN)/meshfix perturb --percent 25 --dist 2h sample_meshes/bracket.vtk out/tangled.vtk
+	$(BIN)/meshfix untangle out/tangled.vtk out/repaired.vtk
+
+test: $(VENV)/installed ## run the tests
+	$(BIN)/pytest
+
+lint: $(VENV)/installed ## ruff, ruff format and mypy
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+check: lint test ## lint and test
+
+sanitize: $(VENV)/installed ## run the kernel tests with address and undefined-behaviour sanitisers
+	$(PYTHON) -m venv $(VENV)-sanitize
+	$(VENV)-sanitize/bin/python -m pip install --quiet --disable-pip-version-check '.[test]' \
+	  --config-settings=cmake.define.MESHFIX_SANITIZE=ON --config-settings=cmake.define.MESHFIX_WERROR=ON \
+	  --config-settings=install.strip=false
+	cd tests && LD_PRELOAD="$$(gcc -print-file-name=libasan.so) $$(gcc -print-file-name=libubsan.so)" \
+	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
+	  ../$(VENV)-sanitize/bin/python -P -m pytest -q -p no:cacheprovider -c ../pyproject.toml --rootdir .. \
+	  test_kernels.py test_linear_program.py test_mesh.py test_untangle.py
+
+bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE for a mesh of yours
+	$(BIN)/python benchmarks/kernels.py $(MESH)
+
+tables: $(VENV)/installed ## the paper's tables on MESH=FILE
+	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)
+
+samples: $(VENV)/installed ## make the sample meshes again
+	$(BIN)/python sample_meshes/generate.py
+
+clean: ## remove what the other targets made
+	rm -rf $(VENV) $(VENV)-sanitize out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,0 +1,83 @@
+"""Meshes for the tests, made by the project's own generator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import generate
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh import Mesh
+from meshfix_cli.perturb import perturb
+
+ROOT = Path(__file__).parents[1]
+SAMPLES = ROOT / "sample_meshes"
+
+
+@pytest.fixture(scope="session")
+def plate() -> Mesh:
+    """332 triangles, valid."""
+    return Mesh.build(*generate.plate(0.18))
+
+
+@pytest.fixture(scope="session")
+def bracket() -> Mesh:
+    """7,968 tetrahedra, valid; two blocks."""
+    return Mesh.build(*generate.bracket(0.18, 8))
+
+
+@pytest.fixture(scope="session")
+def fine() -> Mesh:
+    """About 75,000 tetrahedra in many blocks and several colours, valid."""
+    return Mesh.build(*generate.bracket(0.06, 10))
+
+
+@pytest.fixture(params=["plate", "bracket"])
+def mesh(request: pytest.FixtureRequest) -> Mesh:
+    """A valid mesh of each dimension."""
+    value: Mesh = request.getfixturevalue(request.param)
+    return value
+
+
+def tangle(mesh: Mesh, percent: float = 25, distance: float = 2, seed: int = 0) -> Mesh:
+    """The paper's protocol; the distance in mean edge lengths."""
+    return perturb(mesh, percent, distance * mesh.mean_edge_length(), seed)[0]
+
+
+def star_of(mesh: Mesh, vertex: int) -> tuple[NDArray[np.float64], NDArray[np.uint16]]:
+    """Neighbours (k, d) around the origin and faces (n, d) of a vertex, as the kernels take them."""
+    stars = mesh.topology.stars
+    row = stars.neighbours[stars.neighbour_offsets[vertex] : stars.neighbour_offsets[vertex + 1]]
+    first, last = stars.offsets[vertex], stars.offsets[vertex + 1]
+    faces = stars.faces.reshape(-1, mesh.dimension)[first:last]
+    points = mesh.points[row] - mesh.points[row].mean(axis=0)
+    return points / np.abs(points).max(), np.ascontiguousarray(faces)
+
+
+def random_star(
+    random: np.random.Generator, d: int, spread: float = 0.3
+) -> tuple[NDArray[np.float64], NDArray[np.uint16]]:
+    """A closed star: the hull of points on a sphere, then moved; with a large spread it is tangled."""
+    from scipy.spatial import ConvexHull
+
+    directions = random.standard_normal((int(random.integers(d + 2, 16)), d))
+    points = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    hull = ConvexHull(points)
+    faces = hull.simplices.copy()
+    inward = np.linalg.det(points[faces]) < 0
+    faces[inward] = faces[inward][:, [1, 0, *range(2, d)]]
+    moved = points * random.uniform(1 - spread, 1 + spread, (len(points), 1))
+    moved += spread * random.standard_normal(points.shape)
+    return np.ascontiguousarray(moved / np.abs(moved).max()), faces.astype(np.uint16)
+
+
+Rotate = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+
+
+@pytest.fixture
+def random() -> np.random.Generator:
+    """The same numbers in every run."""
+    return np.random.default_rng(20261122)

@@ -1,0 +1,264 @@
+"""The command line as a user meets it: streams, exit codes, reports, and one line for every error."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from conftest import SAMPLES
+
+from meshfix_cli import read
+from meshfix_cli.cli import main
+from meshfix_cli.quality import METRICS
+from meshfix_cli.untangle import STRATEGIES
+
+MESHFIX = str(Path(sys.executable).parent / "meshfix")
+TANGLED = str(SAMPLES / "plate_tangled.vtk")
+VALID = str(SAMPLES / "plate.vtk")
+
+
+def run(*arguments: object, data: bytes | None = None, code: int = 0) -> subprocess.CompletedProcess[bytes]:
+    done = subprocess.run([MESHFIX, *map(str, arguments)], input=data or b"", capture_output=True, check=False)
+    assert done.returncode == code, done.stderr.decode()
+    assert b"Traceback" not in done.stderr
+    return done
+
+
+def error_line(*arguments: object, code: int = 1, data: bytes | None = None) -> str:
+    """The one line on stderr of a run that fails; nothing on stdout."""
+    done = run(*arguments, code=code, data=data)
+    lines = done.stderr.decode().splitlines()
+    if code == 1:
+        assert len(lines) == 1
+        assert lines[0].startswith("meshfix: error: ")
+    assert done.stdout == b""
+    return lines[-1]
+
+
+def test_untangle_repairs_and_reports_on_stdout(tmp_path: Path) -> None:
+    done = run("untangle", TANGLED, tmp_path / "out.vtk")
+    text = done.stdout.decode()
+    for words in (
+        "inverted elements",
+        "folded interior edges",
+        "ceiling set by fixed",
+        "Laplacian: ",
+        "1st percentile",
+    ):
+        assert words in text
+    assert text.splitlines()[-1] == "valid: no element is inverted"
+    assert done.stderr == b""
+    assert read(tmp_path / "out.vtk").mesh.check()[0] == 0
+
+
+def test_pipeline_of_streams() -> None:
+    source = (SAMPLES / "bracket.vtk").read_bytes()
+    tangled = run("perturb", "--percent", 25, "--dist", "2h", data=source)
+    assert "moved 466 vertices" in tangled.stderr.decode()
+    repaired = run("untangle", "--quiet", data=tangled.stdout)
+    assert repaired.stderr == b""
+    assert "valid" in run("quality", "-", data=repaired.stdout).stdout.decode()
+
+
+def test_a_mesh_on_stdout_puts_the_report_on_stderr() -> None:
+    done = run("untangle", TANGLED)
+    assert done.stdout.startswith(b"# vtk")
+    assert "valid: no element" in done.stderr.decode()
+
+
+def test_json_has_a_schema_and_the_facts_of_the_table(tmp_path: Path) -> None:
+    facts = json.loads(run("untangle", "--json", "--metric", "aspect_ratio", TANGLED, tmp_path / "o.vtk").stdout)
+    assert facts["schema"] == 1
+    assert facts["valid"] is True
+    assert list(facts["quality"]) == ["before", "untangled", "smoothed"]
+    assert facts["quality"]["before"]["inverted"] == facts["sweeps"][0]["inverted"] == 89
+    assert facts["quality"]["before"]["metrics"]["aspect_ratio"]["worst"] is None  # JSON has no infinity
+    assert facts["quality"]["smoothed"]["min_angle"] > 25
+    perturbed = json.loads(run("perturb", "--json", "--percent", 10, "--dist", "0.1", VALID, tmp_path / "p.vtk").stdout)
+    assert (perturbed["moved"], perturbed["distance"]) == (21, 0.1)
+
+
+def test_quality_of_a_tangled_mesh_names_the_first_ten_and_exits_3() -> None:
+    text = run("quality", TANGLED, code=3).stdout.decode()
+    assert "NOT VALID: 89 elements are inverted; the first 10:" in text
+    assert text.count("  cell ") == 10
+    facts = json.loads(run("quality", "--json", TANGLED, code=3).stdout)
+    first = facts["inverted_elements"][0]
+    mesh = meshio.read(TANGLED)
+    np.testing.assert_allclose(first["centroid"], mesh.points[mesh.cells[0].data[first["id"]]].mean(axis=0))
+
+
+def test_inverted_elements_that_remain_exit_3(tmp_path: Path) -> None:
+    out = tmp_path / "out.vtk"
+    text = run("untangle", "--sweeps", 0, TANGLED, out, code=3).stdout.decode()
+    assert "elements remain inverted" in text
+    assert out.exists()
+    run("untangle", "--sweeps", 0, "--allow-inverted", TANGLED, out)
+
+
+def test_elements_numbered_against_their_neighbours_are_not_called_valid(tmp_path: Path) -> None:
+    mesh = meshio.read(VALID)
+    mesh.cells[0].data[3] = mesh.cells[0].data[3][::-1]
+    mesh.write(tmp_path / "in.vtk")
+    text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
+    assert "NOT VALID: 1 elements are numbered against their neighbours" in text
+
+
+def test_quiet_dry_run_and_history(tmp_path: Path) -> None:
+    out, history = tmp_path / "out.vtk", tmp_path / "history.csv"
+    assert run("untangle", "--quiet", TANGLED, out).stdout == b""
+    out.unlink()
+    assert "valid" in run("untangle", "--dry-run", "--history", history, TANGLED, out).stdout.decode()
+    assert not out.exists()
+    assert history.read_text().splitlines()[0] == "phase,sweep,inverted,min_measure,moved,seconds"
+    assert "valid" in run("untangle", "--dry-run", TANGLED).stdout.decode()
+
+
+def test_same_bytes_for_any_number_of_threads(tmp_path: Path) -> None:
+    outputs = set()
+    for threads in (1, 2, 3):
+        run("untangle", "--quiet", "--threads", threads, SAMPLES / "bracket_tangled.vtk", tmp_path / "out.vtk")
+        outputs.add((tmp_path / "out.vtk").read_bytes())
+    assert len(outputs) == 1
+
+
+def test_output_format_by_name_and_by_extension(tmp_path: Path) -> None:
+    run("untangle", "--quiet", TANGLED, tmp_path / "out.obj")
+    assert (tmp_path / "out.obj").read_text().count("\nf ") == 332
+    assert run("untangle", "--quiet", "--format", "gmsh22", TANGLED).stdout.startswith(b"$MeshFormat\n2.2")
+
+
+@pytest.mark.parametrize(
+    ("content", "name", "words"),
+    [
+        (None, "missing.vtk", "No such file or directory"),
+        (b"", "empty.vtk", "is empty"),
+        (b"\x00\xff\x17binary noise" * 50, "noise.vtk", "not a readable vtk"),
+        (b"\x00\xff\x17binary noise" * 50, "noise.xyz", "format is not recognised"),
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n", "range.obj", "refers to vertices"),
+        (b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "nan.obj", "not finite"),
+        (b"v 0 0 0\nv 1 0 0\nv 0 inf 0\nf 1 2 3\n", "inf.obj", "not finite"),
+        (b"v 0 0 0\nv 1 0 0\n", "none.obj", "no tetrahedra and no plane mesh of triangles"),
+    ],
+)
+@pytest.mark.parametrize("command", ["untangle", "perturb", "quality"])
+def test_bad_input_is_one_line(command: str, content: bytes | None, name: str, words: str, tmp_path: Path) -> None:
+    source, target = tmp_path / name, tmp_path / "out.vtk"
+    if content is not None:
+        source.write_bytes(content)
+    extra = ["--percent", 5, "--dist", "h"] if command == "perturb" else []
+    arguments = [source] if command == "quality" else [source, target]
+    line = error_line(command, *extra, *arguments)
+    assert words in line
+    assert name in line
+    assert not target.exists()
+
+
+def test_truncated_files_are_refused(tmp_path: Path) -> None:
+    for name in ("bracket.vtk", "two_materials.msh"):
+        data = (SAMPLES / name).read_bytes()
+        for share in (0.1, 0.3, 0.6, 0.9):
+            path = tmp_path / name
+            path.write_bytes(data[: int(share * len(data))])
+            error_line("untangle", path, tmp_path / "out.vtk")
+    assert not (tmp_path / "out.vtk").exists()
+
+
+def test_meshes_without_simplices_are_refused(tmp_path: Path) -> None:
+    cube = [[x, y, z] for z in (0.0, 1) for x, y in ((0.0, 0), (1, 0), (1, 1), (0, 1))]
+    meshio.Mesh(cube, [("hexahedron", [list(range(8))])]).write(tmp_path / "hexa.vtk")
+    assert "cells: hexahedron" in error_line("untangle", tmp_path / "hexa.vtk", tmp_path / "out.vtk")
+
+
+def test_a_directory_as_input_or_output(tmp_path: Path) -> None:
+    assert "directory" in error_line("untangle", tmp_path, tmp_path / "out.vtk").lower()
+    assert "is a directory" in error_line("untangle", TANGLED, tmp_path)
+
+
+def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
+    assert "no mesh format has the extension '.xyz'" in error_line("untangle", TANGLED, tmp_path / "out.xyz")
+    assert "does not exist" in error_line("untangle", TANGLED, tmp_path / "nowhere" / "out.vtk")
+    assert list(tmp_path.iterdir()) == []
+    assert "No such file" in error_line("untangle", "--history", tmp_path / "no" / "h.csv", TANGLED, tmp_path / "o.vtk")
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_read_only_directory(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    assert "not writable" in error_line("untangle", TANGLED, tmp_path / "out.vtk")
+
+
+def test_full_disk_leaves_the_target(tmp_path: Path) -> None:
+    target = tmp_path / "out.vtk"
+    target.write_text("precious")
+    command = f"ulimit -f 1; trap '' XFSZ; exec {MESHFIX} untangle {SAMPLES / 'bracket_tangled.vtk'} {target}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr.decode().count("\n") == 1
+    assert target.read_text() == "precious"
+    assert [p.name for p in tmp_path.iterdir()] == ["out.vtk"]
+
+
+def test_empty_and_unknown_stdin() -> None:
+    assert "<stdin>: is empty" in error_line("untangle", data=b"")
+    assert "not recognised" in error_line("untangle", data=b"hello")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["untangle", "--strategy", "XX", TANGLED, "o.vtk"],
+        ["untangle", "--sweeps", "-1", TANGLED, "o.vtk"],
+        ["untangle", "--smooth", "x", TANGLED, "o.vtk"],
+        ["untangle", "--threshold", "91", TANGLED, "o.vtk"],
+        ["untangle", "--threads", "0", TANGLED, "o.vtk"],
+        ["untangle", "--metric", "beauty", TANGLED, "o.vtk"],
+        ["untangle", "--format", "xyz", TANGLED, "o.vtk"],
+        ["perturb", "--percent", "101", "--dist", "h", VALID, "o.vtk"],
+        ["perturb", "--percent", "5", "--dist", "-1", VALID, "o.vtk"],
+        ["perturb", "--percent", "5", VALID, "o.vtk"],
+        ["quality"],
+        ["mend", VALID],
+    ],
+)
+def test_wrong_usage_exits_2(arguments: list[str], tmp_path: Path) -> None:
+    done = subprocess.run(
+        [MESHFIX, *arguments], capture_output=True, check=False, cwd=tmp_path, stdin=subprocess.DEVNULL
+    )
+    assert done.returncode == 2
+    assert done.stderr.decode().splitlines()[-1].startswith("Error: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_goes_away_is_no_traceback() -> None:
+    done = subprocess.run(
+        ["bash", "-c", f"{MESHFIX} untangle {SAMPLES / 'bracket_tangled.vtk'} 2>err | head -c 10; cat err; rm err"],
+        capture_output=True, check=False, cwd="/tmp",
+    )  # fmt: skip
+    assert b"Traceback" not in done.stdout + done.stderr
+    assert b"Exception ignored" not in done.stdout + done.stderr
+
+
+def test_help_of_every_command_names_every_option_and_strategy() -> None:
+    for name, command in main.commands.items():
+        text = CliRunner().invoke(main, [name, "--help"]).output
+        assert command.help
+        for parameter in command.params:
+            if parameter.param_type_name == "option":
+                assert parameter.opts[0] in text
+                assert parameter.help or name == "untangle" or parameter.name == "seed"
+    text = CliRunner().invoke(main, ["untangle", "--help"]).output
+    assert all(strategy in text for strategy in STRATEGIES)
+    assert all(metric in text for metric in METRICS)
+
+
+def test_python_dash_m() -> None:
+    done = subprocess.run([sys.executable, "-m", "meshfix_cli", "--version"], capture_output=True, check=True, cwd="/")
+    assert done.stdout.startswith(b"meshfix, version ")

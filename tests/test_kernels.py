@@ -1,0 +1,189 @@
+"""Kernels against definitions: sines and gradients, the minimum-norm point, facets, stars, blocks and colours."""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+
+import numpy as np
+import pytest
+from conftest import random_star, star_of, tangle
+from scipy.optimize import nnls
+
+from meshfix_cli import _kernels
+from meshfix_cli.mesh import Mesh
+from meshfix_cli.quality import evaluate
+from meshfix_cli.untangle import Move
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_gradients_of_the_sines_by_finite_differences(random: np.random.Generator, d: int) -> None:
+    for _ in range(50):
+        points, faces = random_star(random, d, spread=0.1)
+        x = random.uniform(-0.05, 0.05, d)
+        values, gradients, _ = _kernels.sines(points, faces, x)
+        step = 1e-6
+        for k, unit in enumerate(np.eye(d)):
+            plus, minus = (_kernels.sines(points, faces, x + s * step * unit)[0] for s in (1, -1))
+            np.testing.assert_allclose(gradients[:, k], (plus - minus) / (2 * step), rtol=1e-5, atol=1e-6)
+        assert len(values) == len(faces) * (3 if d == 2 else 6)
+
+
+def test_sines_are_those_of_the_metric(mesh: Mesh) -> None:
+    expected = evaluate("min_sine", mesh)
+    stars = mesh.topology.stars
+    for vertex in np.flatnonzero(mesh.movable)[::7]:
+        stars_row = stars.incident[stars.offsets[vertex] : stars.offsets[vertex + 1]]
+        points, faces = star_of(mesh, vertex)
+        around = mesh.points[stars.neighbours[stars.neighbour_offsets[vertex] : stars.neighbour_offsets[vertex + 1]]]
+        centre = around.mean(axis=0)
+        x = (mesh.points[vertex] - centre) / np.abs(around - centre).max()
+        values, _, smallest2 = _kernels.sines(points, faces, np.ascontiguousarray(x))
+        per_simplex = values.reshape(len(faces), -1).min(axis=1)
+        np.testing.assert_allclose(per_simplex, expected[stars_row], rtol=1e-9)
+        assert np.sqrt(smallest2) == pytest.approx(per_simplex.min(), rel=1e-12)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_min_norm_point_is_optimal_and_in_the_hull(random: np.random.Generator, d: int) -> None:
+    for trial in range(500):
+        vectors = random.standard_normal((int(random.integers(1, 12)), d)) + random.uniform(0, 2)
+        if trial % 5 == 0:
+            vectors = np.concatenate([vectors, vectors])  # repeated
+        if trial % 7 == 0:
+            vectors[:, -1] = 1.0  # in a plane
+        p = _kernels.min_norm_point(vectors)
+        assert (vectors @ p).min() >= p @ p - 1e-9  # no vector points further back: the optimality condition
+        weights, residual = nnls(np.vstack([vectors.T, np.ones(len(vectors))]), np.append(p, 1.0))
+        assert residual < 1e-9
+        assert weights.min() >= 0
+
+
+def test_theorem_3_2_level_sets_of_the_minimum_sine_are_convex(random: np.random.Generator) -> None:
+    checked = 0
+    for _ in range(300):
+        points, faces = random_star(random, 2, spread=0.15)
+        candidates = random.uniform(-0.6, 0.6, (20, 2))
+        sine2 = [_kernels.sines(points, faces, x)[2] for x in candidates]
+        feasible = [(q, x) for q, x in zip(sine2, candidates, strict=True) if q > 0]
+        for (qa, a), (qb, b) in itertools.combinations(feasible, 2):
+            middle = _kernels.sines(points, faces, (a + b) / 2)[2]
+            assert middle >= min(qa, qb) * (1 - 1e-12)
+            checked += 1
+    assert checked > 1000
+
+
+def test_facets_boundary_and_stars_by_definition(mesh: Mesh) -> None:
+    topology, d = mesh.topology, mesh.dimension
+    facets = defaultdict(list)
+    for s, simplex in enumerate(topology.simplices.tolist()):
+        for k in range(d + 1):
+            facets[tuple(sorted(simplex[:k] + simplex[k + 1 :]))].append(s * (d + 1) + k)
+    mates = topology.mates.ravel()
+    for corners in facets.values():
+        if len(corners) == 1:
+            assert mates[corners[0]] == -1
+        else:
+            a, b = corners
+            assert (mates[a], mates[b]) == (b, a)
+    boundary = {v for facet, corners in facets.items() if len(corners) == 1 for v in facet}
+    assert boundary == set(np.flatnonzero(topology.boundary).tolist())
+
+    stars = topology.stars
+    for vertex in range(0, topology.n, 11):
+        incident = stars.incident[stars.offsets[vertex] : stars.offsets[vertex + 1]]
+        assert set(incident.tolist()) == set(np.flatnonzero((topology.simplices == vertex).any(axis=1)).tolist())
+        row = stars.neighbours[stars.neighbour_offsets[vertex] : stars.neighbour_offsets[vertex + 1]]
+        assert set(row.tolist()) == set(topology.simplices[incident].ravel().tolist()) - {vertex}
+        faces = stars.faces.reshape(-1, d)[stars.offsets[vertex] : stars.offsets[vertex + 1]]
+        measure = np.linalg.det(mesh.points[row][faces] - mesh.points[vertex])
+        expected = _kernels.measure(mesh.points, topology.simplices, 1)[0][incident] * (2 if d == 2 else 6)
+        np.testing.assert_allclose(measure, expected, rtol=1e-9)
+
+
+def test_blocks_partition_and_colours_separate(fine: Mesh) -> None:
+    topology, stars = fine.topology, fine.topology.stars
+    assert sorted(stars.block_vertices.tolist()) == np.flatnonzero(topology.used).tolist()
+    sizes = np.diff(stars.block_offsets)
+    assert (sizes[:-1] == 1024).all()
+    assert 0 < sizes[-1] <= 1024
+    block_of = np.empty(topology.n, dtype=int)
+    colour_of = np.empty(len(sizes), dtype=int)
+    for block in range(len(sizes)):
+        block_of[stars.block_vertices[stars.block_offsets[block] : stars.block_offsets[block + 1]]] = block
+    for colour, blocks in enumerate(topology.colours):
+        colour_of[blocks] = colour
+    assert sorted(stars.colour_blocks.tolist()) == list(range(len(sizes)))
+    start = np.repeat(np.arange(topology.n), np.diff(stars.neighbour_offsets))
+    across = block_of[start] != block_of[stars.neighbours]
+    assert (colour_of[block_of[start[across]]] != colour_of[block_of[stars.neighbours[across]]]).all()
+    assert len(topology.colours) > 2
+
+
+def relocated(mesh: Mesh, move: Move, threads: int, rotate: int) -> bytes:
+    points = mesh.points.copy()
+    for blocks in mesh.topology.colours:
+        rolled = np.roll(blocks, rotate)
+        _kernels.relocate(move, points, mesh.movable, mesh.topology.stars, rolled, 0.07, False, threads)
+    return points.tobytes()
+
+
+@pytest.mark.parametrize("move", list(Move))
+def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move: Move) -> None:
+    start = tangle(fine, 5, 0.3) if move > Move.COMBINED_UNTANGLE else tangle(fine)
+    expected = relocated(start, move, 1, 0)
+    assert expected != start.points.tobytes()
+    for threads, rotate in ((1, 1), (2, 0), (2, 2), (3, 0), (3, 1)):
+        assert relocated(start, move, threads, rotate) == expected
+
+
+def test_only_movable_vertices_move(mesh: Mesh) -> None:
+    start = tangle(mesh)
+    for move in Move:
+        points = start.points.copy()
+        for blocks in mesh.topology.colours:
+            _kernels.relocate(move, points, mesh.movable, mesh.topology.stars, blocks, 1.0, False, 1)
+        assert points[~mesh.movable].tobytes() == start.points[~mesh.movable].tobytes()
+
+
+def test_laplacian_moves_to_the_mean_of_the_neighbours(plate: Mesh) -> None:
+    vertex = int(np.flatnonzero(plate.movable)[0])
+    only = plate.movable & (np.arange(plate.topology.n) == vertex)
+    points = plate.points.copy()
+    for blocks in plate.topology.colours:
+        _kernels.relocate(Move.LAPLACIAN, points, only, plate.topology.stars, blocks, 0.0, False, 1)
+    stars = plate.topology.stars
+    row = stars.neighbours[stars.neighbour_offsets[vertex] : stars.neighbour_offsets[vertex + 1]]
+    np.testing.assert_allclose(points[vertex], plate.points[row].mean(axis=0), rtol=1e-14)
+
+
+@pytest.mark.parametrize("move", [Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH])
+def test_smoothing_never_lowers_the_worst_of_a_star(mesh: Mesh, move: Move) -> None:
+    """Star by star, on a mesh with invalid stars, which must be left alone."""
+    start = tangle(mesh, 20, 0.6)
+    points, stars = start.points.copy(), mesh.topology.stars
+    improved = 0
+    for vertex in np.flatnonzero(mesh.movable)[:400]:
+        star = stars.incident[stars.offsets[vertex] : stars.offsets[vertex + 1]]
+        before = evaluate("min_sine", start.with_points(points.copy()))[star].min()
+        only = mesh.movable & (np.arange(mesh.topology.n) == vertex)
+        old = points[vertex].copy()
+        for blocks in mesh.topology.colours:
+            _kernels.relocate(move, points, only, stars, blocks, 1.0, False, 1)
+        after = evaluate("min_sine", start.with_points(points.copy()))[star].min()
+        assert after >= before * (1 - 1e-12) if before > 0 else (points[vertex] == old).all()
+        improved += after > before
+    assert improved > 20
+
+
+def test_validity_is_relative_to_the_simplex() -> None:
+    """det > 0 is too weak: a sliver at rounding error of its size is not valid, at any scale."""
+    triangle = np.array([[0, 1, 2]], dtype=np.int32)
+    for scale in (1e-30, 1.0, 1e30):
+        for height, valid in ((1e-12, 1), (1e-16, 0), (0.0, 0), (-1.0, 0)):
+            points = scale * np.array([[0.0, 0.0], [1.0, 0.0], [0.5, height]])
+            assert _kernels.measure(points, triangle, 1)[1][0] == valid
+            assert _kernels.check(points, triangle, 1)[0] == 1 - valid
+    tetrahedron = np.array([[0, 1, 2, 3]], dtype=np.int32)
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
+    assert _kernels.measure(points, tetrahedron, 1)[1][0] == 0

@@ -1,0 +1,148 @@
+"""Building a mesh: what is refused, how it is oriented, what is fixed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from conftest import tangle
+
+from meshfix_cli import untangle
+from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh import Mesh
+from meshfix_cli.quality import summarise
+
+SQUARE: list[list[float]] = [[0, 0], [1, 0], [1, 1], [0, 1], [0.4, 0.6]]
+FAN = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
+
+
+@pytest.mark.parametrize(
+    ("points", "simplices", "words"),
+    [
+        (SQUARE, np.empty((0, 3), dtype=int), "no elements"),
+        (SQUARE, [[0, 1, 9]], "refers to vertices"),
+        (SQUARE, [[0, 1, -1]], "refers to vertices"),
+        (SQUARE, [[0, 1, 1]], "names a vertex twice"),
+        (SQUARE, [[0, 1, 2, 3]], "shape"),
+        (SQUARE, [[0.0, 1.0, 2.0]], "integers"),
+        ([[0.0, 0, 0, 0]], [[0, 1, 2]], "shape"),
+        ([[0, 0], [1, 0], [np.nan, 1]], [[0, 1, 2]], "vertex 2 .* not finite"),
+        ([[0, 0], [np.inf, 0], [0, 1]], [[0, 1, 2]], "vertex 1 .* not finite"),
+        ([[0, 0], [1e200, 0], [0, 1]], [[0, 1, 2]], "cannot be computed with"),
+        ([[5.0, 5], [5, 5], [5, 5]], [[0, 1, 2]], "in one point"),
+        (
+            [[0, 0], [1, 0], [0, 1], [1, 1], [0.5, 2]],
+            [[0, 1, 2], [0, 1, 3], [1, 0, 4]],
+            "more than two triangles share",
+        ),
+    ],
+)
+def test_refused_with_a_clear_sentence(points: object, simplices: object, words: str) -> None:
+    with pytest.raises(InvalidMeshError, match=words):
+        Mesh.build(points, simplices)  # type: ignore[arg-type]
+
+
+def test_moebius_band_is_refused() -> None:
+    n = 8
+    triangles = []
+    for i in range(n):
+        a, b = 2 * i, 2 * i + 1
+        c, d = (2 * i + 2, 2 * i + 3) if i < n - 1 else (1, 0)
+        triangles += [[a, b, c], [b, d, c]]
+    points = np.random.default_rng(0).uniform(size=(2 * n, 2))
+    with pytest.raises(InvalidMeshError, match="Moebius"):
+        Mesh.build(points, triangles)
+
+
+def test_nan_in_a_point_that_no_element_uses_is_no_matter() -> None:
+    mesh = Mesh.build([*SQUARE, [np.nan, 0]], FAN)
+    assert mesh.topology.used.tolist() == [True] * 5 + [False]
+    assert mesh.movable.tolist() == [False] * 4 + [True, False]
+    assert untangle(mesh).valid
+
+
+def test_mirrored_mesh_is_solved_in_its_own_orientation(mesh: Mesh) -> None:
+    """Turning the numbering, or the geometry, turns nothing else: the same points come out."""
+    tangled = tangle(mesh)
+    simplices = tangled.topology.simplices[:, [1, 0, *range(2, mesh.dimension + 1)]]
+    mirrored = Mesh.build(tangled.points, simplices)
+    assert mirrored.topology.flipped.all()
+    assert mirrored.topology.mirrored_components == 1
+    assert not mirrored.topology.mixed_numbering.any()
+    np.testing.assert_array_equal(mirrored.topology.simplices, tangled.topology.simplices)
+    assert untangle(mirrored).after.points.tobytes() == untangle(tangled).after.points.tobytes()
+    reflected = Mesh.build(tangled.points * ([-1] + [1] * (mesh.dimension - 1)), tangled.topology.simplices)
+    assert reflected.check()[0] == tangled.check()[0]
+
+
+def test_elements_numbered_against_their_neighbours_are_told_apart(mesh: Mesh) -> None:
+    simplices = mesh.topology.simplices.copy()
+    odd = [3, 50, 51, 200]
+    simplices[odd] = simplices[odd][:, [1, 0, *range(2, mesh.dimension + 1)]]
+    mixed = Mesh.build(mesh.points, simplices)
+    assert np.flatnonzero(mixed.topology.mixed_numbering).tolist() == odd
+    assert mixed.check()[0] == 0
+    assert summarise(mixed).folded == 0
+
+
+def test_swapping_vertices_does_not_hide_a_tangle(plate: Mesh) -> None:
+    """A mesh made 'positive' by renumbering its inverted elements still overlaps itself, and is found out."""
+    tangled = tangle(plate)
+    simplices = tangled.topology.simplices.copy()
+    bad = summarise(tangled).inverted_elements
+    simplices[bad] = simplices[bad][:, [1, 0, 2]]
+    hidden = Mesh.build(tangled.points, simplices)
+    assert hidden.check()[0] == len(bad)
+    assert untangle(hidden).valid
+
+
+def test_components_of_either_orientation() -> None:
+    mesh = Mesh.build(
+        [*SQUARE, *(np.array(SQUARE) + 5).tolist()],
+        [*FAN, *[[b + 5, a + 5, c + 5] for a, b, c in FAN]],
+    )
+    assert mesh.check()[0] == 0
+    assert mesh.topology.mirrored_components == 1
+    assert len(np.unique(mesh.topology.component)) == 2
+
+
+def test_repeated_simplices_count_once() -> None:
+    mesh = Mesh.build(SQUARE, [*FAN, [2, 4, 1]])
+    assert mesh.topology.source.tolist() == [0, 1, 2, 3]
+    assert mesh.movable.tolist() == [False] * 4 + [True]
+
+
+def test_coincident_points_are_never_merged() -> None:
+    """Two squares that touch along a slit of doubled points: the slit is boundary on both sides."""
+    left = np.array(SQUARE)
+    right = left + np.array([1, 0])
+    mesh = Mesh.build(np.concatenate([left, right]), [*FAN, *(np.array(FAN) + 5).tolist()])
+    assert np.flatnonzero(mesh.movable).tolist() == [4, 9]
+
+
+def test_components_that_touch_in_a_vertex_work() -> None:
+    points: list[list[float]] = [*SQUARE, [2, 1], [2, 2], [1, 2], [1.2, 1.9]]
+    mesh = Mesh.build(points, [*FAN, [2, 5, 8], [5, 6, 8], [6, 7, 8], [7, 2, 8]])
+    assert np.flatnonzero(mesh.movable).tolist() == [4, 8]
+    assert untangle(mesh).valid
+
+
+def test_interface_between_regions_is_the_facets_between_labels(bracket: Mesh) -> None:
+    labels = (bracket.points[bracket.topology.simplices].mean(axis=1)[:, 1] > 1.0).astype(int)
+    held = bracket.topology.interface(labels)
+    groups = [set(bracket.topology.simplices[labels == k].ravel().tolist()) for k in (0, 1)]
+    inside = ~bracket.topology.boundary
+    assert set(np.flatnonzero(held & inside)) == {v for v in groups[0] & groups[1] if inside[v]}
+    assert not bracket.with_fixed(held).movable[held].any()
+    assert not bracket.topology.interface(np.zeros_like(labels)).any()
+
+
+def test_a_mesh_is_a_value(plate: Mesh) -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        plate.points[0, 0] = 1.0
+    moved = plate.with_points(plate.points + 1.0)
+    assert moved.topology is plate.topology
+
+
+def test_mean_edge_length_is_that_of_the_distinct_edges() -> None:
+    mesh = Mesh.build(SQUARE[:4], [[0, 1, 2], [0, 2, 3]])
+    assert mesh.mean_edge_length() == pytest.approx((4 + np.sqrt(2)) / 5)

@@ -1,0 +1,247 @@
+"""Reading and writing: what is held, what is kept, and that a target is replaced at once or not at all."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from conftest import SAMPLES, tangle
+from scipy.spatial.transform import Rotation
+
+from meshfix_cli import read, summarise, untangle, write
+from meshfix_cli.errors import InvalidMeshError, ReadError, WriteError
+from meshfix_cli.mesh import Mesh
+from meshfix_cli.meshfile import Document, output_format
+from meshfix_cli.meshfile.formats import sniff
+
+SAMPLE_FILES = sorted(p.name for p in SAMPLES.iterdir() if p.suffix in (".vtk", ".msh", ".obj"))
+
+
+def save(path: Path, mesh: Mesh, **extra: object) -> Path:
+    points = np.column_stack([mesh.points, np.zeros((len(mesh.points), 3 - mesh.dimension))])
+    kind = "triangle" if mesh.dimension == 2 else "tetra"
+    meshio.Mesh(points, [(kind, mesh.topology.simplices)], **extra).write(path)
+    return path
+
+
+def roundtrip(path: Path, target: Path) -> tuple[Document, Document]:
+    document = read(path)
+    outcome = untangle(document.mesh)
+    assert outcome.valid
+    write(document, outcome.after, target)
+    return document, read(target)
+
+
+@pytest.mark.parametrize("name", SAMPLE_FILES)
+def test_samples_come_back_valid_with_their_connectivity_and_fixed_points(name: str, tmp_path: Path) -> None:
+    before, after = roundtrip(SAMPLES / name, tmp_path / name)
+    assert after.mesh.check()[0] == 0
+    assert after.format == before.format
+    np.testing.assert_array_equal(after.mesh.topology.simplices, before.mesh.topology.simplices)
+    fixed = ~before.mesh.movable
+    assert after.source.points[fixed].tobytes() == before.source.points[fixed].tobytes()
+
+
+def test_physical_groups_survive_and_hold_their_interface(tmp_path: Path) -> None:
+    before, after = roundtrip(SAMPLES / "two_materials.msh", tmp_path / "out.msh")
+    assert before.fixed["between regions of gmsh:physical"] > 0
+    for document in (before, after):
+        assert set(document.source.field_data) == {"steel", "copper"}
+    np.testing.assert_array_equal(
+        after.source.cell_data["gmsh:physical"][0], before.source.cell_data["gmsh:physical"][0]
+    )
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_type_and_encoding_of_the_input_are_kept(tmp_path: Path, plate: Mesh, dtype: str, binary: bool) -> None:
+    mesh = tangle(plate)
+    points = np.column_stack([mesh.points, np.zeros(len(mesh.points))]).astype(dtype)
+    path = tmp_path / "in.vtk"
+    meshio.Mesh(points, [("triangle", mesh.topology.simplices)]).write(path, binary=binary)
+    document, after = roundtrip(path, tmp_path / "out.vtk")
+    assert after.source.points.dtype.newbyteorder("=") == np.dtype(dtype)
+    assert document.format.binary is binary
+    stored = document.as_stored(untangle(document.mesh).after)
+    np.testing.assert_array_equal(after.mesh.points, stored.points)
+
+
+def test_what_float32_stores_is_what_is_judged(tmp_path: Path) -> None:
+    """Far from the origin float32 cannot hold the mesh: the report speaks of what is in the file."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]], dtype="f4") * 0.01 + 1e5
+    path = tmp_path / "far.vtk"
+    meshio.Mesh(points.astype("f4"), [("triangle", [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])]).write(path)
+    document = read(path)
+    moved = np.array(document.mesh.points)
+    moved[4] = [1e5 + 0.005, 1e5 + 0.005]
+    inside = document.mesh.with_points(moved)
+    assert document.as_stored(inside).points[4].tolist() == [np.float32(1e5 + 0.005)] * 2
+
+
+@pytest.mark.parametrize("angles", [(0, 0, 0), (90, 0, 0), (0, 90, 0), (25, -40, 70)])
+def test_a_mesh_in_any_plane_is_solved_in_that_plane(tmp_path: Path, plate: Mesh, angles: tuple[float, ...]) -> None:
+    turn = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
+    tangled = tangle(plate)
+    points = np.column_stack([tangled.points, np.zeros(plate.topology.n)]) @ turn.T + [3.0, -2.0, 5.0]
+    path = tmp_path / "in.vtk"
+    meshio.Mesh(points, [("triangle", plate.topology.simplices)]).write(path)
+    document, after = roundtrip(path, tmp_path / "out.vtk")
+    flat = (after.source.points - [3.0, -2.0, 5.0]) @ turn
+    assert np.abs(flat[:, 2]).max() < 1e-12
+    fixed = ~document.mesh.movable
+    np.testing.assert_array_equal(after.source.points[fixed], points[fixed])
+    assert summarise(after.mesh).min_angle == pytest.approx(summarise(untangle(tangled).after).min_angle, rel=1e-3)
+
+
+def test_curved_surface_is_refused(tmp_path: Path, plate: Mesh) -> None:
+    points = np.column_stack([plate.points, 0.1 * np.sin(plate.points[:, 0])])
+    path = tmp_path / "curved.vtk"
+    meshio.Mesh(points, [("triangle", plate.topology.simplices)]).write(path)
+    with pytest.raises(ReadError, match="curved surface"):
+        read(path)
+
+
+def test_cells_of_lower_dimension_hold_their_vertices(tmp_path: Path, bracket: Mesh) -> None:
+    inner = np.flatnonzero(bracket.movable)
+    cells = [
+        ("tetra", bracket.topology.simplices),
+        ("line", [[inner[0], inner[1]]]),
+        ("triangle", [[inner[5], inner[6], inner[7]]]),
+    ]
+    path = tmp_path / "in.vtk"
+    meshio.Mesh(bracket.points, cells).write(path)
+    document = read(path)
+    held = bracket.movable & ~document.mesh.movable
+    assert np.flatnonzero(held).tolist() == sorted(inner[[0, 1, 5, 6, 7]].tolist())
+    assert document.fixed["on cells of another kind"] == 5
+
+
+def test_fix_and_regions_name_arrays(tmp_path: Path, plate: Mesh) -> None:
+    flags = np.zeros(plate.topology.n)
+    chosen = np.flatnonzero(plate.movable)[:3]
+    flags[chosen] = 1
+    labels = (plate.points[plate.topology.simplices].mean(axis=1)[:, 0] > 1.5).astype(float)
+    path = save(tmp_path / "in.vtk", plate, point_data={"hold": flags}, cell_data={"part": [labels]})
+    document = read(path, fix="hold", regions="part")
+    assert not document.mesh.movable[chosen].any()
+    assert document.fixed["by --fix hold"] == 3
+    assert document.fixed["between regions of part"] > 3
+    with pytest.raises(ReadError, match=r"no point data named 'nope' \(found: hold\)"):
+        read(path, fix="nope")
+    with pytest.raises(ReadError, match=r"no cell data named 'nope' \(found: part\)"):
+        read(path, regions="nope")
+
+
+def test_ids_count_all_cells_of_the_file(tmp_path: Path, plate: Mesh) -> None:
+    cells = [("line", [[0, 1], [1, 2]]), ("triangle", plate.topology.simplices)]
+    path = tmp_path / "in.vtk"
+    meshio.Mesh(np.column_stack([plate.points, 0 * plate.points[:, 0]]), cells).write(path)
+    assert read(path).ids.tolist() == list(range(2, 2 + len(plate.topology.simplices)))
+
+
+def test_notes_tell_what_a_user_should_know(tmp_path: Path, plate: Mesh) -> None:
+    triangles = np.concatenate([plate.topology.simplices, plate.topology.simplices[:2]])[:, ::-1]
+    points = np.column_stack([plate.points, 0 * plate.points[:, 0]])
+    path = tmp_path / "in.vtk"
+    meshio.Mesh(np.concatenate([points, [[9.0, 9, 9]]]), [("triangle", triangles)]).write(path)
+    notes = " / ".join(read(path).notes)
+    assert "2 triangles are listed more than once" in notes
+    assert "1 points belong to no element" in notes
+    assert "all elements are numbered the other way round" in notes
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "binary"),
+    [
+        (b"# vtk DataFile Version 4.2\nt\nBINARY\n", "vtk42", True),
+        (b"# vtk DataFile Version 5.1\nt\nASCII\n", "vtk", False),
+        (b"$MeshFormat\n2.2 0 8\n", "gmsh22", False),
+        (b"$MeshFormat\n4.1 1 8\n", "gmsh", True),
+        (b"$Comments\nx\n$EndComments\n$MeshFormat\n4.1 0 8\n", "gmsh", False),
+        (b'<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid">', "vtu", True),
+        (b"MeshVersionFormatted 2", "medit", None),
+        (b"ply\nformat ascii 1.0\n", "ply", False),
+        (b"# Blender v3\nmtllib a.mtl\no Plane\nv 1.0 0.0 0.0\n", "obj", None),
+        (b"*Heading\n", "abaqus", None),
+        (b"*NODE\n", "abaqus", None),
+        (b"OFF\n3 1 0\n", "off", None),
+    ],
+)
+def test_first_bytes_tell_the_format(text: bytes, name: str, binary: bool | None) -> None:
+    form = sniff(text)
+    assert form is not None
+    assert (form.name, form.binary) == (name, binary)
+
+
+@pytest.mark.parametrize("noise", [b"", b"\x00\x01\x02\xff" * 99, b"hello", b"<?xml?><svg/>"])
+def test_noise_has_no_format(noise: bytes) -> None:
+    assert sniff(noise) is None
+
+
+@pytest.mark.parametrize("suffix", [".vtu", ".msh", ".mesh", ".obj", ".inp", ".ply"])
+def test_other_formats_by_extension(tmp_path: Path, plate: Mesh, suffix: str) -> None:
+    document = read(save(tmp_path / "in.vtk", tangle(plate)))
+    outcome = untangle(document.mesh)
+    write(document, outcome.after, tmp_path / f"out{suffix}")
+    after = read(tmp_path / f"out{suffix}")
+    assert after.mesh.check()[0] == 0
+    np.testing.assert_array_equal(after.mesh.topology.simplices, document.mesh.topology.simplices)
+    if suffix == ".msh":
+        assert after.format.name == "gmsh"  # never meshio's default of ANSYS
+
+
+def test_msh_keeps_its_version(tmp_path: Path) -> None:
+    document = read(SAMPLES / "two_materials.msh")
+    assert output_format(document, str(tmp_path / "x.msh")).name == "gmsh22"
+
+
+def test_existing_file_keeps_its_mode_and_links_are_followed(tmp_path: Path, plate: Mesh) -> None:
+    path = save(tmp_path / "real.vtk", tangle(plate))
+    path.chmod(0o640)
+    link = tmp_path / "link.vtk"
+    link.symlink_to(path)
+    document = read(link)
+    write(document, untangle(document.mesh).after, link)  # INPUT = OUTPUT
+    assert link.is_symlink()
+    assert stat.S_IMODE(path.stat().st_mode) == 0o640
+    assert read(path).mesh.check()[0] == 0
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["link.vtk", "real.vtk"]
+
+
+def test_new_file_obeys_the_umask(tmp_path: Path, plate: Mesh) -> None:
+    document = read(save(tmp_path / "in.vtk", plate))
+    old = os.umask(0o027)
+    try:
+        write(document, document.mesh, tmp_path / "out.vtk")
+    finally:
+        os.umask(old)
+    assert stat.S_IMODE((tmp_path / "out.vtk").stat().st_mode) == 0o640
+
+
+@pytest.mark.parametrize("fault", ["writer", "disk"])
+def test_a_failed_write_leaves_the_original(
+    tmp_path: Path, plate: Mesh, fault: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = save(tmp_path / "in.vtk", plate)
+    original = path.read_bytes()
+    document = read(path)
+
+    def broken(*args: object, **kwargs: object) -> None:
+        raise OSError(28, "No space left on device") if fault == "disk" else ValueError("bad")
+
+    monkeypatch.setattr(meshio, "write", broken)
+    with pytest.raises(WriteError, match="No space left" if fault == "disk" else "cannot be written as vtk: bad"):
+        write(document, document.mesh, path)
+    assert path.read_bytes() == original
+    assert [p.name for p in tmp_path.iterdir()] == ["in.vtk"]
+
+
+def test_errors_carry_the_name_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "bad.vtk"
+    meshio.Mesh([[0.0, 0, 0], [1, 0, 0], [0, 1, np.nan]], [("triangle", [[0, 1, 2]])]).write(path)
+    with pytest.raises(InvalidMeshError, match=r"bad\.vtk: vertex 2 has a coordinate that is not finite"):
+        read(path)

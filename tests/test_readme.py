@@ -1,0 +1,69 @@
+"""Everything the README shows is run, and prints what the README says it prints."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from meshfix_cli.untangle import STRATEGIES
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+SECONDS = re.compile(r"\d[\d.e-]* s\b")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def commands() -> list[tuple[str, str]]:
+    """Commands and the output shown below each."""
+    shown = []
+    for block in blocks("console"):
+        for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+            command, _, output = part.partition("\n")
+            if not command.startswith("make"):
+                shown.append((command, output))
+    return shown
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "sample_meshes").symlink_to(ROOT / "sample_meshes")
+    return tmp_path
+
+
+def run(command: list[str], folder: Path) -> str:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(command, capture_output=True, check=False, cwd=folder, env=environment)
+    assert done.returncode in (0, 3), done.stderr.decode()
+    return done.stdout.decode()
+
+
+def test_commands_print_what_is_shown(folder: Path) -> None:
+    assert len(commands()) >= 5
+    for command, output in commands():
+        printed = run(["bash", "-o", "pipefail", "-c", command], folder)
+        assert SECONDS.sub("", printed) == SECONDS.sub("", output), command
+
+
+def test_python_example_prints_what_is_shown(folder: Path) -> None:
+    (example,) = blocks("python")
+    (output,) = blocks("text")
+    assert run([sys.executable, "-c", example], folder) == output
+
+
+def test_make_targets_exist() -> None:
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"make ([a-z]+)", README)) <= targets
+
+
+def test_every_strategy_is_in_the_table() -> None:
+    assert re.findall(r"^\| `(\w+)` \|", README, re.MULTILINE) == list(STRATEGIES)

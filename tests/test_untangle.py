@@ -1,0 +1,191 @@
+"""Strategies, smoothing and the promises of the result."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+
+import numpy as np
+import pytest
+from conftest import tangle
+from scipy.spatial.transform import Rotation
+
+from meshfix_cli import perturb, untangle
+from meshfix_cli.mesh import Mesh
+from meshfix_cli.perturb import Distance
+from meshfix_cli.quality import ceiling, evaluate, summarise
+from meshfix_cli.report import history_csv
+from meshfix_cli.untangle import SMOOTHING, STRATEGIES, SWEEPS, plan, steps
+
+CASES = [(5, 1), (10, 1), (25, 1), (50, 1), (25, 2), (25, 4), (25, 8)]  # the paper's tables
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_laplacian_smoothing_untangles_every_case_in_2d(plate: Mesh, case: tuple[int, int]) -> None:
+    """The paper's finding below table 4.1."""
+    assert untangle(tangle(plate, *case), "LS").valid
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("strategy", ["auto", "LUS"])
+def test_default_and_recommended_strategy_solve_every_case(mesh: Mesh, strategy: str, case: tuple[int, int]) -> None:
+    for seed in range(3):
+        tangled = tangle(mesh, *case, seed=seed)
+        assert tangled.check()[0] > 0
+        outcome = untangle(tangled, strategy)
+        summary = summarise(outcome.after)
+        assert outcome.valid
+        assert (summary.inverted, summary.folded) == (0, 0)
+        assert outcome.after.points[~mesh.movable].tobytes() == mesh.points[~mesh.movable].tobytes()
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_every_strategy_reports_what_it_did(mesh: Mesh, strategy: str) -> None:
+    tangled = tangle(mesh)
+    outcome = untangle(tangled, strategy)
+    untangling = [r for r in outcome.records if r.phase not in ("input", "best", SMOOTHING)]
+    assert {r.phase for r in untangling} <= {phase.name for phase in STRATEGIES[strategy]}
+    assert 1 <= len(untangling) <= SWEEPS
+    assert outcome.records[0].inverted == summarise(tangled).inverted
+    assert outcome.records[-1].inverted == summarise(outcome.after).inverted
+    assert outcome.records[-1].min_measure == summarise(outcome.after).min_measure
+    assert summarise(outcome.untangled).inverted == outcome.records[-1].inverted or not outcome.valid
+
+
+def test_plans_are_the_papers() -> None:
+    lus = plan("LUS")
+    assert [(p.name, p.max_sweeps) for p in lus] == [("Laplacian", 3), ("LP", 37), (SMOOTHING, 3)]
+    assert [p.max_sweeps for p in plan("US", sweeps=7, smooth=10)] == [7, 10]
+    assert [p.max_sweeps for p in plan("LUS", sweeps=2)] == [2, 0, 3]
+
+
+def test_valid_mesh_goes_straight_to_smoothing(mesh: Mesh) -> None:
+    for strategy in STRATEGIES:
+        assert {r.phase for r in untangle(mesh, strategy).records} == {"input", SMOOTHING}
+    assert untangle(mesh, smooth=0).after is mesh
+
+
+def test_smoothing_never_lowers_the_worst_quality_of_the_mesh(mesh: Mesh) -> None:
+    worst = -math.inf
+    for current, record in steps(tangle(mesh, 5, 0.3), plan("auto", smooth=12)):
+        if record.phase == SMOOTHING or record.inverted == 0:
+            now = evaluate("min_sine", current).min()
+            assert now >= worst * (1 - 1e-12)
+            worst = now
+    assert math.degrees(math.asin(worst)) > 0.9 * summarise(mesh).min_angle
+
+
+def test_smoothing_reaches_the_ceiling_that_fixed_vertices_set(bracket: Mesh) -> None:
+    after = untangle(tangle(bracket)).after
+    assert summarise(after).min_angle == pytest.approx(ceiling(bracket), rel=1e-12)
+
+
+def with_an_inverted_fixed_simplex(mesh: Mesh) -> Mesh:
+    """Reflect a vertex of a simplex that has no free vertex at the centre of the face opposite."""
+    simplices = mesh.topology.simplices
+    first, *others = simplices[~mesh.movable[simplices].any(axis=1)][0]
+    points = mesh.points.copy()
+    points[first] = 2 * points[others].mean(axis=0) - points[first]
+    return mesh.with_points(points)
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_impossible_mesh_is_reported_and_not_made_worse(mesh: Mesh, strategy: str) -> None:
+    outcome = untangle(with_an_inverted_fixed_simplex(mesh), strategy)
+    assert not outcome.valid
+    assert outcome.records[-1].rank[0] <= outcome.records[0].rank[0]
+    assert outcome.after.check()[0] > 0
+
+
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_never_worse_than_the_input(bracket: Mesh, strategy: str) -> None:
+    for sweeps in (0, 1, 2):
+        outcome = untangle(tangle(bracket, 60, 6), strategy, sweeps=sweeps)
+        assert outcome.records[-1].rank[0] <= outcome.records[0].rank[0]
+
+
+def test_same_bits_for_any_number_of_threads(fine: Mesh) -> None:
+    tangled = tangle(fine)
+    outcomes = [untangle(tangled, threads=threads) for threads in (1, 2, 3)]
+    assert outcomes[0].valid
+    assert len({o.after.points.tobytes() for o in outcomes}) == 1
+    assert len({tuple((r.inverted, r.min_measure, r.moved) for r in o.records) for o in outcomes}) == 1
+
+
+@pytest.mark.parametrize("scale", [1e-6, 25.4, 1e6])
+def test_unit_of_length_does_not_matter(mesh: Mesh, scale: float) -> None:
+    tangled = tangle(mesh)
+    scaled = Mesh.build(tangled.points * scale, tangled.topology.simplices)
+    expected, actual = untangle(tangled), untangle(scaled)
+    assert [r.inverted for r in actual.records] == [r.inverted for r in expected.records]
+    np.testing.assert_allclose(actual.after.points / scale, expected.after.points, atol=1e-7)
+
+
+def test_offset_does_not_matter(mesh: Mesh) -> None:
+    """At a million sizes away a double keeps ten digits of the shape."""
+    tangled = tangle(mesh)
+    shifted = Mesh.build(tangled.points + 1e6, tangled.topology.simplices)
+    outcome = untangle(shifted)
+    assert outcome.valid
+    expected = summarise(untangle(tangled).after)
+    assert summarise(outcome.after).min_angle == pytest.approx(expected.min_angle, rel=0.05)
+
+
+def test_axes_do_not_matter_to_laplacian_and_smoothing(mesh: Mesh) -> None:
+    """The LP's box has axes; nothing else does, and on these stars the box is not reached."""
+    tangled = tangle(mesh, 10, 1)
+    turn = Rotation.from_euler("xyz", [20, -35, 50], degrees=True).as_matrix()
+    if mesh.dimension == 2:
+        turn = Rotation.from_euler("z", 50, degrees=True).as_matrix()[:2, :2]
+    rotated = Mesh.build(tangled.points @ turn.T, tangled.topology.simplices)
+    np.testing.assert_allclose(untangle(rotated).after.points @ turn, untangle(tangled).after.points, atol=1e-6)
+
+
+def test_collapsed_and_pinched_stars_do_no_harm(mesh: Mesh) -> None:
+    points = mesh.points.copy()
+    points[mesh.movable] = points[mesh.movable][0]
+    for strategy in STRATEGIES:
+        outcome = untangle(mesh.with_points(points.copy()), strategy)
+        assert np.isfinite(outcome.after.points).all()
+        assert outcome.records[-1].inverted == outcome.after.check()[0]
+
+
+def test_perturb_series_moves_the_same_vertices_in_the_same_directions(bracket: Mesh) -> None:
+    moves = {}
+    for percent, distance in ((5, 1.0), (25, 1.0), (25, 3.0)):
+        moved_mesh, count = perturb(bracket, percent, distance, seed=7)
+        assert count == round(percent / 100 * bracket.topology.n)
+        moves[percent, distance] = moved_mesh.points - bracket.points
+        lengths = np.linalg.norm(moves[percent, distance], axis=1)
+        assert (lengths > 0).sum() == count
+        np.testing.assert_allclose(lengths[lengths > 0], distance)
+    some = (moves[5, 1.0] != 0).any(axis=1)
+    np.testing.assert_array_equal(moves[25, 1.0][some], moves[5, 1.0][some])
+    np.testing.assert_allclose(moves[25, 3.0], 3 * moves[25, 1.0], atol=1e-12)
+    assert not (moves[25, 3.0][~bracket.movable]).any()
+    assert perturb(bracket, 100, 1.0)[1] == bracket.movable.sum()
+    assert (
+        perturb(bracket, 25, 1.0, seed=8)[0].points.tobytes() != perturb(bracket, 25, 1.0, seed=7)[0].points.tobytes()
+    )
+
+
+@pytest.mark.parametrize(("text", "value", "in_h"), [("2h", 2.0, True), ("h", 1.0, True), ("0.3", 0.3, False)])
+def test_distances(plate: Mesh, text: str, value: float, in_h: bool) -> None:
+    distance = Distance.parse(text)
+    assert distance == Distance(value, in_h)
+    assert distance.length(plate) == value * (plate.mean_edge_length() if in_h else 1)
+
+
+@pytest.mark.parametrize("text", ["", "x", "-1", "nan", "infh", "2hh", "1e400"])
+def test_distances_refused(text: str) -> None:
+    with pytest.raises(ValueError):
+        Distance.parse(text)
+
+
+def test_history_is_the_series_of_figure_4_4(plate: Mesh) -> None:
+    outcome = untangle(tangle(plate), "LUS")
+    rows = list(csv.DictReader(io.StringIO(history_csv(outcome.records))))
+    assert [int(row["inverted"]) for row in rows] == [r.inverted for r in outcome.records]
+    assert [float(row["min_measure"]) for row in rows] == [r.min_measure for r in outcome.records]
+    assert rows[0]["phase"] == "input"

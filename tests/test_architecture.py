@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-import tomllib
 
 import meshfix_cli
 
@@ -108,6 +107,7 @@ def test_every_public_function_has_a_docstring() -> None:
 
 
 def test_version_and_dependencies_are_those_of_the_project_file() -> None:
+    tomllib = pytest.importorskip("tomllib", reason="Python 3.10 has no reader of TOML")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["version"] == meshfix_cli.__version__
     names = {requirement.split(">")[0] for requirement in project["dependencies"]}

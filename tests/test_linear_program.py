@@ -84,25 +84,34 @@ def stars(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> Iterator[t
         yield "interior" if mesh.movable[vertex] else "boundary", star_of(mesh, vertex)
 
 
-def test_against_highs_and_duality(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> None:
+def test_every_success_carries_a_certificate(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> None:
     count = 0
     statuses: dict[str, set[int]] = {}
     for kind, star in stars(random, bracket, plate):
         count += 1
         status, pi, weights, pivots = _kernels.linear_program(*star)
         statuses.setdefault(kind, set()).add(status)
-        gradients, values, _ = programme(*star)
         if status == DEGENERATE:
-            singular = np.linalg.svd(gradients, compute_uv=False)
+            singular = np.linalg.svd(programme(*star)[0], compute_uv=False)
             assert len(singular) < star[0].shape[1] or singular[-1] <= 1e-8 * singular[0]
             continue
         assert status == OPTIMAL
         assert pivots < 100
         assert_certificate(star, pi, weights)
-        assert pi[-1] == pytest.approx(highs(*star), rel=1e-9, abs=1e-9 * np.abs(values).max())
     assert count == 5000
     assert statuses["flat"] == {DEGENERATE} == statuses["collapsed"]
     assert statuses["random"] == {OPTIMAL} == statuses["interior"]
+
+
+def test_against_highs(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> None:
+    compared = 0
+    for _, star in stars(random, bracket, plate):
+        status, pi, _, _ = _kernels.linear_program(*star)
+        if status == OPTIMAL:
+            scale = np.abs(programme(*star)[1]).max()
+            assert pi[-1] == pytest.approx(highs(*star), rel=1e-9, abs=1e-9 * scale)
+            compared += 1
+    assert compared > 4500
 
 
 @pytest.mark.parametrize("d", [2, 3])

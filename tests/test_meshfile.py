@@ -117,7 +117,7 @@ def test_cells_of_lower_dimension_hold_their_vertices(tmp_path: Path, bracket: M
     document = read(path)
     held = bracket.movable & ~document.mesh.movable
     assert np.flatnonzero(held).tolist() == sorted(inner[[0, 1, 5, 6, 7]].tolist())
-    assert document.fixed["on cells of another kind"] == 5
+    assert document.fixed["on other cells of the file"] == 5
 
 
 def test_fix_and_regions_name_arrays(tmp_path: Path, plate: Mesh) -> None:
@@ -226,7 +226,7 @@ def test_new_file_obeys_the_umask(tmp_path: Path, plate: Mesh) -> None:
 def test_a_failed_write_leaves_the_original(
     tmp_path: Path, plate: Mesh, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = save(tmp_path / "in.vtk", plate)
+    path = save(tmp_path / "in.vtu", plate)
     original = path.read_bytes()
     document = read(path)
 
@@ -234,10 +234,10 @@ def test_a_failed_write_leaves_the_original(
         raise OSError(28, "No space left on device") if fault == "disk" else ValueError("bad")
 
     monkeypatch.setattr(meshio, "write", broken)
-    with pytest.raises(WriteError, match="No space left" if fault == "disk" else "cannot be written as vtk: bad"):
+    with pytest.raises(WriteError, match="No space left" if fault == "disk" else "cannot be written as vtu: bad"):
         write(document, document.mesh, path)
     assert path.read_bytes() == original
-    assert [p.name for p in tmp_path.iterdir()] == ["in.vtk"]
+    assert [p.name for p in tmp_path.iterdir()] == ["in.vtu"]
 
 
 def test_errors_carry_the_name_of_the_file(tmp_path: Path) -> None:

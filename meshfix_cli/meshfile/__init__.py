@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import struct
 import sys
 import tempfile
 from dataclasses import dataclass, field
@@ -16,14 +17,17 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh import CELL_NAMES, Mesh
-from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile import formats, gmsh, obj, vtk
 from meshfix_cli.meshfile.atomic import check_target, write_file
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
+from meshfix_cli.meshfile.splice import splice
 
 __all__ = ["Document", "check_target", "output_format", "read", "write"]
 
+STDIN = "<stdin>"
 REGION_ARRAYS = ("gmsh:physical", "medit:ref", "cell_tags")
+SPLICED = {"gmsh": gmsh.find_coordinates, "obj": obj.find_coordinates, "vtk": vtk.find_coordinates}
 SIMPLEX = {3: "tetra", 2: "triangle"}
 
 
@@ -44,6 +48,8 @@ class Document:
     notes : tuple of str
         What a user should know about the file, a sentence each.
     source : meshio.Mesh
+    data : bytes
+        The file.
     basis : (2, 3) float64 or None
         Spans the plane of a planar mesh in space.
     """
@@ -55,6 +61,7 @@ class Document:
     fixed: dict[str, int]
     notes: tuple[str, ...]
     source: Any = field(repr=False)
+    data: bytes = field(repr=False)
     basis: NDArray[np.float64] | None
 
     def file_points(self, mesh: Mesh) -> NDArray[np.floating[Any]]:
@@ -98,17 +105,24 @@ def read(path: str | os.PathLike[str], fix: str | None = None, regions: str | No
     InvalidMeshError
         See `Mesh.build`.
     """
-    name = "<stdin>" if os.fspath(path) == "-" else os.fspath(path)
+    name = STDIN if os.fspath(path) == "-" else os.fspath(path)
     try:
-        source, form = _read_stdin() if name == "<stdin>" else _read_path(Path(path))
-        return _document(name, source, form, fix, regions)
+        data = _read_bytes(name)
+        form = formats.sniff(data[: formats.HEAD]) or formats.by_name(Path(name))
+        if form is None:
+            raise ReadError("the format is not recognised")
+        source = _read_stream(data, form) if name == STDIN else _read_with_meshio(Path(name), form)
+        return _document(name, source, data, form, fix, regions)
     except MeshfixError as error:
         text = str(error)
         raise type(error)(text if text.startswith(name) else f"{name}: {text}") from error
 
 
 def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: Format | None = None) -> None:
-    """Write a moved mesh; the rest of the document is written as it came.
+    """Write a moved mesh.
+
+    In the format it came in, every byte outside the coordinates that moved stays as it was where the format is
+    one of `SPLICED`; otherwise meshio writes what it knows of the document.
 
     Parameters
     ----------
@@ -130,12 +144,15 @@ def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: 
     target = os.fspath(target)
     form = form or output_format(document, target)
     check_target(target)
+    points = document.file_points(mesh)
+    spliced = _splice(document, points) if form == document.format else None
     out = document.source.copy()
-    out.points = document.file_points(mesh)
-    if not _keeps_entities(out):
-        out.point_data.pop("gmsh:dim_tags", None)
+    out.points = points
 
     def produce(temporary: Path) -> None:
+        if spliced is not None:
+            temporary.write_bytes(spliced)
+            return
         try:
             with _quiet():
                 meshio.write(temporary, out, file_format=form.name, **formats.options(form))
@@ -175,31 +192,33 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
     return form
 
 
-def _read_stdin() -> tuple[Any, Format]:
-    data = sys.stdin.buffer.read()
+def _splice(document: Document, points: NDArray[np.floating[Any]]) -> bytes | None:
+    """Put points into the original bytes; None where that cannot be done."""
+    find_coordinates = SPLICED.get(document.format.reader)
+    if find_coordinates is None:
+        return None
+    try:
+        places = find_coordinates(document.data)
+    except (ValueError, struct.error):  # meshio made sense of it, we did not
+        return None
+    return None if places is None else splice(document.data, places, document.source.points, points)
+
+
+def _read_bytes(name: str) -> bytes:
+    try:
+        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
+    except OSError as error:
+        raise ReadError(error.strerror or str(error)) from error
     if not data:
-        raise ReadError("<stdin>: is empty")
-    form = formats.sniff(data[: formats.HEAD])
-    if form is None:
-        raise ReadError("<stdin>: the format is not recognised")
+        raise ReadError("is empty")
+    return data
+
+
+def _read_stream(data: bytes, form: Format) -> Any:
     with tempfile.TemporaryDirectory(prefix="meshfix-") as folder:
         path = Path(folder) / "stdin"
         path.write_bytes(data)
-        return _read_with_meshio(path, form), form
-
-
-def _read_path(path: Path) -> tuple[Any, Format]:
-    try:
-        with path.open("rb") as file:
-            head = file.read(formats.HEAD)
-    except OSError as error:
-        raise ReadError(f"{path}: {error.strerror}") from error
-    if not head:
-        raise ReadError(f"{path}: is empty")
-    form = formats.sniff(head) or formats.by_name(path)
-    if form is None:
-        raise ReadError(f"{path}: the format is not recognised")
-    return _read_with_meshio(path, form), form
+        return _read_with_meshio(path, form)
 
 
 def _read_with_meshio(path: Path, form: Format) -> Any:
@@ -216,11 +235,6 @@ def _read_with_meshio(path: Path, form: Format) -> Any:
     if missing:
         raise ReadError(f"is truncated: {missing}")
     return source
-
-
-def _keeps_entities(source: Any) -> bool:
-    """Whether meshio can write gmsh's geometric entities: not without a physical group."""
-    return "gmsh:dim_tags" not in source.point_data or "gmsh:physical" in source.cell_data
 
 
 def _native(source: Any) -> Any:
@@ -249,7 +263,7 @@ def _first_line(error: BaseException) -> str:
     return lines[0] if lines else type(error).__name__
 
 
-def _document(name: str, source: Any, form: Format, fix: str | None, regions: str | None) -> Document:
+def _document(name: str, source: Any, data: bytes, form: Format, fix: str | None, regions: str | None) -> Document:
     dimension = _dimension(source)
     starts = np.cumsum([0, *(len(block.data) for block in source.cells)])
     chosen = [i for i, block in enumerate(source.cells) if block.type == SIMPLEX[dimension]]
@@ -257,7 +271,7 @@ def _document(name: str, source: Any, form: Format, fix: str | None, regions: st
     ids = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in chosen])
 
     points, basis = _solved_points(source, simplices, dimension)
-    held = {"on cells of another kind": _on_other_cells(source, chosen, len(points))}
+    held = {"on other cells of the file": _on_other_cells(source, chosen, len(points))}
     if fix is not None:
         held[f"by --fix {fix}"] = _fixed_by(source, fix)
     mesh = Mesh.build(points, simplices)
@@ -272,9 +286,9 @@ def _document(name: str, source: Any, form: Format, fix: str | None, regions: st
         fixed[reason] = int(counted.sum())
         mesh = mesh.with_fixed(mask)
     notes = _notes(mesh, len(simplices))
-    if not _keeps_entities(source):
-        notes += ("gmsh's geometric entities are not written back (the file has no physical group)",)
-    return Document(name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, basis)
+    return Document(
+        name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, data, basis
+    )
 
 
 def _dimension(source: Any) -> int:

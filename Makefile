@@ -35,10 +35,10 @@ sanitize: $(VENV)/installed ## run the kernel tests with address and undefined-b
 	$(VENV)-sanitize/bin/python -m pip install --quiet --disable-pip-version-check . pytest \
 	  --config-settings=cmake.define.MESHFIX_SANITIZE=ON --config-settings=cmake.define.MESHFIX_WERROR=ON \
 	  --config-settings=install.strip=false
-	cd tests && LD_PRELOAD="$$(gcc -print-file-name=libasan.so) $$(gcc -print-file-name=libubsan.so)" \
+	LD_PRELOAD="$$(gcc -print-file-name=libasan.so) $$(gcc -print-file-name=libubsan.so)" \
 	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
-	  ../$(VENV)-sanitize/bin/python -P -m pytest -q -p no:cacheprovider -c ../pyproject.toml --rootdir .. \
-	  test_kernels.py test_linear_program.py test_mesh.py test_untangle.py -k "not highs"
+	  $(VENV)-sanitize/bin/pytest -q -p no:cacheprovider -k "not highs" \
+	  tests/test_kernels.py tests/test_linear_program.py tests/test_mesh.py tests/test_untangle.py
 
 bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE for a mesh of yours
 	$(BIN)/python benchmarks/kernels.py $(MESH)

@@ -126,9 +126,12 @@ def _write_vtk(path: Path, points: Points, cells: Simplices, title: str) -> None
     path.write_text("\n".join(lines) + "\n")
 
 
-def _write_msh(path: Path, points: Points, tets: Simplices, groups: NDArray[np.int64], names: list[str]) -> None:
+def _write_msh(
+    path: Path, points: Points, tets: Simplices, groups: NDArray[np.int64], names: list[str], title: str
+) -> None:
     """gmsh 2.2 ASCII, with a physical group of each tetrahedron (groups count from 1)."""
-    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
+    lines = ["$Comments", title, "$EndComments", "$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
+    lines += ["$PhysicalNames", str(len(names))]
     lines += [f'3 {k + 1} "{name}"' for k, name in enumerate(names)]
     lines += ["$EndPhysicalNames", "$Nodes", str(len(points))]
     lines += [f"{k + 1} {row}" for k, row in enumerate(_rows(points))]
@@ -158,20 +161,31 @@ def main() -> None:
     points, triangles = plate(0.18)
     points = points.round(6)
     _write_vtk(folder / "plate.vtk", points, triangles, "plate with two holes, by generate.py")
-    tangled = _tangled(points, triangles, 25, 2)
-    _write_vtk(folder / "plate_tangled.vtk", tangled.round(6), triangles, "plate.vtk, 25 percent moved by 2h")
-    _write_obj(folder / "plate_tangled.obj", tangled.round(6), triangles, "plate.vtk, 25 percent moved by 2h")
+    tangled, title = _tangled(points, triangles, 25, 2), "plate.vtk with 25 percent moved by 2h, by generate.py"
+    _write_vtk(
+        folder / "plate_tangled.vtk",
+        tangled.round(6),
+        triangles,
+        title,
+    )
+    _write_obj(
+        folder / "plate_tangled.obj",
+        tangled.round(6),
+        triangles,
+        title,
+    )
     points, tets = bracket(0.18, 8)
     points = points.round(6)
     _write_vtk(folder / "bracket.vtk", points, tets, "bent bracket with two holes, by generate.py")
-    tangled = _tangled(points, tets, 10, 1)
-    _write_vtk(folder / "bracket_tangled.vtk", tangled.round(6), tets, "bracket.vtk, 10 percent moved by h")
+    tangled, title = _tangled(points, tets, 10, 1), "bracket.vtk with 10 percent moved by h, by generate.py"
+    _write_vtk(folder / "bracket_tangled.vtk", tangled.round(6), tets, title)
     points, tets = bracket(0.25, 6, angle=0.0)
     groups = 1 + (points[tets].mean(axis=1)[:, 2] > points[:, 2].max() / 2).astype(np.int64)
     tangled = _tangled(points.round(6), tets, 10, 1)
     interface = np.isin(np.arange(len(points)), tets[groups == 1]) & np.isin(np.arange(len(points)), tets[groups == 2])
     tangled = np.where(interface[:, None], points, tangled)
-    _write_msh(folder / "two_materials.msh", tangled.round(6), tets, groups, ["steel", "copper"])
+    title = "flat plate of two materials, by generate.py, 10 percent moved by h but for the interface"
+    _write_msh(folder / "two_materials.msh", tangled.round(6), tets, groups, ["steel", "copper"], title)
 
 
 if __name__ == "__main__":

@@ -9,10 +9,15 @@ help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
 
 # The package installed in place, so that changes of Python files need no new installation; those of kernels do.
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
 $(VENV)/installed: pyproject.toml $(KERNELS)
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]' \
-	  --config-settings=cmake.define.MESHFIX_WERROR=ON
+	$(PIP) --editable . --config-settings=cmake.define.MESHFIX_WERROR=ON
+	touch $@
+
+$(VENV)/developer: $(VENV)/installed
+	$(PIP) --editable '.[dev]' --config-settings=cmake.define.MESHFIX_WERROR=ON
 	touch $@
 
 demo: $(VENV)/installed ## install in .venv, tangle a 3-D sample and repair it
@@ -20,17 +25,17 @@ demo: $(VENV)/installed ## install in .venv, tangle a 3-D sample and repair it
 	$(BIN)/meshfix perturb --percent 25 --dist 2h sample_meshes/bracket.vtk out/tangled.vtk
 	$(BIN)/meshfix untangle out/tangled.vtk out/repaired.vtk
 
-test: $(VENV)/installed ## run the tests
+test: $(VENV)/developer ## run the tests
 	$(BIN)/pytest
 
-lint: $(VENV)/installed ## ruff, ruff format and mypy
+lint: $(VENV)/developer ## ruff, ruff format and mypy
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
 check: lint test ## lint and test
 
-sanitize: $(VENV)/installed ## run the kernel tests with address and undefined-behaviour sanitisers
+sanitize: ## run the kernel tests with address and undefined-behaviour sanitisers
 	$(PYTHON) -m venv $(VENV)-sanitize
 	$(VENV)-sanitize/bin/python -m pip install --quiet --disable-pip-version-check . pytest \
 	  --config-settings=cmake.define.MESHFIX_SANITIZE=ON --config-settings=cmake.define.MESHFIX_WERROR=ON \
@@ -46,7 +51,7 @@ bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE fo
 tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)
 
-samples: $(VENV)/installed ## make the sample meshes again
+samples: $(VENV)/developer ## make the sample meshes again
 	$(BIN)/python sample_meshes/generate.py
 
 clean: ## remove what the other targets made

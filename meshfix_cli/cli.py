@@ -38,6 +38,14 @@ class _Choice(click.Choice):  # type: ignore[type-arg]
         return self._load()
 
 
+class _Range(click.FloatRange):
+    """NaN is in no range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        return number if number == number else self.fail(f"{value!r} is not a number", param, ctx)
+
+
 class _Distance(click.ParamType):  # type: ignore[type-arg]
     name = "LENGTH"
 
@@ -65,8 +73,12 @@ class _Group(click.Group):
             _fail(str(error))
 
 
-def _fail(message: str) -> NoReturn:
+def _complain(message: str) -> None:
     click.echo(f"meshfix: error: {' '.join(message.split())}", err=True)
+
+
+def _fail(message: str) -> NoReturn:
+    _complain(message)
     sys.exit(ERROR)
 
 
@@ -113,10 +125,15 @@ class _Files:
     form: str | None
     dry_run: bool
 
-    def open(self, held: _Held) -> tuple[Document, Format]:
-        """Read INPUT, and find out before any work whether OUTPUT can be written."""
+    def open(self, held: _Held, *others: str | None) -> tuple[Document, Format]:
+        """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
         from meshfix_cli.meshfile import check_target, output_format
 
+        meshes = [Path(name).resolve() for name in (self.source, self.target) if name != "-"]
+        for other in filter(None, others):
+            if Path(other).resolve() in meshes:
+                raise click.UsageError(f"{other} is the name of a mesh")
+            check_target(other)
         if not self.dry_run:
             check_target(self.target)
         document = held.read(self.source)
@@ -125,11 +142,16 @@ class _Files:
             raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
         return document, output
 
-    def write(self, document: Document, mesh: Mesh, output: Format) -> None:
+    def write(self, document: Document, mesh: Mesh, output: Format) -> tuple[Mesh, tuple[str, ...]]:
+        """Write OUTPUT; return the mesh as the file holds it, and what the user should know."""
         from meshfix_cli.meshfile import write
 
-        if not self.dry_run:
-            write(document, mesh, self.target, output)
+        if self.dry_run:
+            return document.as_stored(mesh), ()
+        stored = write(document, mesh, self.target, output)
+        if document.is_kept_by(output):
+            return stored, ()
+        return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
 
     @property
     def report_stream(self) -> Any:
@@ -146,7 +168,9 @@ class _Show:
     quiet: bool
     threads: int
 
-    def report(self, command: str, document: Document, stages: Mapping[str, Mesh], **more: Any) -> Report:
+    def report(
+        self, command: str, document: Document, stages: Mapping[str, Mesh], notes: tuple[str, ...] = (), **more: Any
+    ) -> Report:
         from meshfix_cli.quality import ceiling, summarise
         from meshfix_cli.report import Report
 
@@ -160,7 +184,7 @@ class _Show:
             stages={stage: summarise(mesh, self.metrics, self.threads) for stage, mesh in stages.items()},
             ceiling=ceiling(result, self.threads),
             fixed=document.fixed,
-            notes=document.notes,
+            notes=(*document.notes, *notes),
             **more,
         )
 
@@ -228,7 +252,7 @@ def main() -> None:
 @click.option("--smooth", type=click.IntRange(0), default=SMOOTH, show_default=True, help="Smoothing passes.")
 @click.option(
     "--threshold",
-    type=click.FloatRange(0, 90),
+    type=_Range(0, 90),
     metavar="DEGREES",
     help=f"Optimise stars with smaller angles. [default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
 )
@@ -255,22 +279,21 @@ def untangle(
     from meshfix_cli.report import console, history_csv, with_progress
     from meshfix_cli.untangle import collect, plan, steps
 
-    document, output = files.open(held)
+    document, output = files.open(held, history)
     run = steps(document.mesh, plan(strategy, sweeps, smooth), threshold, show.threads)
     outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)))
-    result = document.as_stored(outcome.after)
-    stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
-    report = show.report("untangle", document, stages, records=outcome.records, facts={"strategy": strategy})
-    files.write(document, outcome.after, output)
+    result, notes = files.write(document, outcome.after, output)
     if history is not None:
         _write_text(history, history_csv(outcome.records))
+    stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
+    report = show.report("untangle", document, stages, notes, records=outcome.records, facts={"strategy": strategy})
     show.print(report, files.report_stream)
     sys.exit(VALID if report.valid or allow_inverted else INVERTED)
 
 
 @main.command()
 @_writing
-@click.option("--percent", type=click.FloatRange(0, 100), required=True, help="Of all vertices; interior ones move.")
+@click.option("--percent", type=_Range(0, 100), required=True, help="Of all vertices; interior ones move.")
 @click.option("--dist", type=_Distance(), required=True, help="2h: two mean edge lengths; 0.3: model units.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @_holding
@@ -286,10 +309,9 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
     document, output = files.open(held)
     length = dist.length(document.mesh)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
-    stages = {"before": document.mesh, "perturbed": document.as_stored(perturbed)}
+    result, notes = files.write(document, perturbed, output)
     facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}
-    report = show.report("perturb", document, stages, facts=facts)
-    files.write(document, perturbed, output)
+    report = show.report("perturb", document, {"before": document.mesh, "perturbed": result}, notes, facts=facts)
     show.print(report, files.report_stream)
 
 
@@ -298,14 +320,19 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
 @_holding
 @_reporting
 def quality(sources: tuple[str, ...], held: _Held, show: _Show) -> None:
-    """Report the quality of meshes; writes nothing."""
-    valid = True
+    """Report the quality of meshes; writes nothing. One that cannot be read does not stop the others."""
+    codes = set()
     for source in sources:
-        document = held.read(source)
-        report = show.report("quality", document, {"quality": document.mesh})
+        try:
+            document = held.read(source)
+        except MeshfixError as error:
+            _complain(str(error))
+            codes.add(ERROR)
+            continue
+        report = show.report("quality", document, {"mesh": document.mesh})
         show.print(report, sys.stdout)
-        valid &= report.valid
-    sys.exit(VALID if valid else INVERTED)
+        codes.add(VALID if report.valid else INVERTED)
+    sys.exit(ERROR if ERROR in codes else max(codes))
 
 
 def _write_text(target: str, text: str) -> None:

@@ -218,7 +218,7 @@ def _check_coordinates(points: NDArray[np.float64], simplices: NDArray[np.int32]
     infinite = used & ~np.isfinite(points).all(axis=1)
     if infinite.any():
         vertex = int(np.argmax(infinite))
-        raise InvalidMeshError(f"vertex {vertex} has a coordinate that is not finite: {points[vertex].tolist()}")
+        raise InvalidMeshError(f"vertex {vertex} has a coordinate that is not finite")
     low, high = points[used].min(axis=0), points[used].max(axis=0)
     if max(-low.min(), high.max()) > LARGEST_COORDINATE:
         raise InvalidMeshError(f"coordinates beyond {LARGEST_COORDINATE:g} cannot be computed with")

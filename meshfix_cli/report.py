@@ -74,6 +74,12 @@ class Report:
         return int(self.mesh.topology.mixed_numbering.sum())
 
     @property
+    def stuck(self) -> int:
+        """Inverted elements without a free vertex: nothing that may move can mend them."""
+        simplices = self.mesh.topology.simplices[self.result.inverted_elements]
+        return int((~self.mesh.movable[simplices].any(axis=1)).sum())
+
+    @property
     def valid(self) -> bool:
         """No element is inverted, by shape or by numbering."""
         return self.result.inverted == 0 and self.misnumbered == 0
@@ -124,7 +130,8 @@ def to_json(report: Report) -> dict[str, Any]:
         "misnumbered": report.misnumbered,
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
-        "inverted_elements": [{"id": i, "centroid": c} for i, c in _listed(report)],
+        "first_inverted": [{"id": i, "centroid": c} for i, c in _listed(report)],
+        "inverted_without_free_vertex": report.stuck,
         "sweeps": [asdict(record) for record in report.records],
         "notes": list(report.notes),
         **(report.facts or {}),
@@ -232,11 +239,15 @@ def _verdict(report: Report) -> list[str]:
         text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
         lines.append(text + (f"; the first {LISTED}:" if count > LISTED else ":"))
         lines += [f"  cell {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
+        if report.stuck:
+            lines.append(
+                f"{report.stuck:,} of them with no free vertex: the fixed ones, such as the boundary, are wrong"
+            )
     if report.misnumbered:
-        lines.append(
-            f"NOT VALID: {report.misnumbered:,} elements are numbered against their neighbours;"
-            " meshfix keeps the numbering"
-        )
+        first = report.ids[np.flatnonzero(report.mesh.topology.mixed_numbering)[:LISTED]].tolist()
+        some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > LISTED else "")
+        what = "element is numbered against its" if report.misnumbered == 1 else "elements are numbered against their"
+        lines.append(f"NOT VALID: {report.misnumbered:,} {what} neighbours (cell {some}); meshfix keeps the numbering")
     return lines
 
 

@@ -21,6 +21,7 @@ SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
 SMOOTH = 3  # section 4: three passes of smoothing
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
+PATIENCE = 3  # sweeps without fewer inverted elements after which a phase has stalled
 
 
 class Move(IntEnum):
@@ -45,7 +46,8 @@ class Phase:
     max_sweeps : int or None
         None: as many as the strategy's limit leaves.
     until : {"valid", "stalled", "settled"}
-        When to stop early. "valid": no element is inverted; "stalled": as well, or their number no longer falls;
+        When to stop early. "valid": no element is inverted; "stalled": as well, or their number has not fallen
+        below the best for `PATIENCE` sweeps;
         "settled": no vertex moved, which stops every phase.
     only_invalid : bool
         Visit only stars with an inverted element.
@@ -161,14 +163,15 @@ def steps(
         if phase.from_best and best[1].rank < record.rank:
             mesh, record = best[0], replace(best[1], phase="best", moved=0, seconds=0.0)
             yield mesh, record
+        waited = 0
         for number in range(1, (phase.max_sweeps or 0) + 1):
             if phase.until != "settled" and record.inverted == 0:
                 break
-            inverted = record.inverted
             mesh, record = _sweep(mesh, phase, number, math.sin(math.radians(degrees)) ** 2, threads)
+            waited = 0 if record.inverted < best[1].inverted else waited + 1
             best = min(best, (mesh, record), key=lambda pair: pair[1].rank)
             yield mesh, record
-            if record.moved == 0 or (phase.until == "stalled" and record.inverted >= inverted):
+            if record.moved == 0 or (phase.until == "stalled" and waited == PATIENCE):
                 break
 
 

@@ -90,7 +90,7 @@ def test_quality_of_a_tangled_mesh_names_the_first_ten_and_exits_3() -> None:
     assert "NOT VALID: 89 elements are inverted; the first 10:" in text
     assert text.count("  cell ") == 10
     facts = json.loads(run("quality", "--json", TANGLED, code=3).stdout)
-    first = facts["inverted_elements"][0]
+    first = facts["first_inverted"][0]
     mesh = meshio.read(TANGLED)
     np.testing.assert_allclose(first["centroid"], mesh.points[mesh.cells[0].data[first["id"]]].mean(axis=0))
 
@@ -108,7 +108,7 @@ def test_elements_numbered_against_their_neighbours_are_not_called_valid(tmp_pat
     mesh.cells[0].data[3] = mesh.cells[0].data[3][::-1]
     mesh.write(tmp_path / "in.vtk")
     text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
-    assert "NOT VALID: 1 elements are numbered against their neighbours" in text
+    assert "NOT VALID: 1 element is numbered against its neighbours (cell 3); meshfix keeps the numbering" in text
 
 
 def test_quiet_dry_run_and_history(tmp_path: Path) -> None:
@@ -186,7 +186,66 @@ def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
     assert "no mesh format has the extension '.xyz'" in error_line("untangle", TANGLED, tmp_path / "out.xyz")
     assert "does not exist" in error_line("untangle", TANGLED, tmp_path / "nowhere" / "out.vtk")
     assert list(tmp_path.iterdir()) == []
-    assert "No such file" in error_line("untangle", "--history", tmp_path / "no" / "h.csv", TANGLED, tmp_path / "o.vtk")
+    line = error_line("untangle", "--history", tmp_path / "no" / "h.csv", TANGLED, tmp_path / "o.vtk")
+    assert "does not exist" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_history_never_replaces_a_mesh(tmp_path: Path) -> None:
+    mesh = tmp_path / "in.vtk"
+    mesh.write_bytes(Path(TANGLED).read_bytes())
+    assert "is the name of a mesh" in error_line("untangle", "--history", mesh, mesh, tmp_path / "o.vtk", code=2)
+    assert "is the name of a mesh" in error_line("untangle", "--history", mesh, TANGLED, mesh, code=2)
+    assert mesh.read_bytes() == Path(TANGLED).read_bytes()
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".ply", ".off"])
+def test_a_format_that_cannot_hold_the_mesh_is_refused(suffix: str, tmp_path: Path) -> None:
+    """meshio writes tetrahedra to these as an empty mesh, without a word."""
+    line = error_line("untangle", SAMPLES / "bracket_tangled.vtk", tmp_path / f"out{suffix}")
+    assert "cannot be written as" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_conversion_says_that_it_is_one(tmp_path: Path) -> None:
+    text = run("untangle", SAMPLES / "two_materials.msh", tmp_path / "out.vtu").stdout.decode()
+    assert "note: written anew as vtu by meshio" in text
+    assert "note:" not in run("untangle", SAMPLES / "two_materials.msh", tmp_path / "out.msh").stdout.decode()
+
+
+def test_pipes_and_devices_with_names(tmp_path: Path) -> None:
+    fifo = tmp_path / "fifo.vtk"
+    os.mkfifo(fifo)
+    repair = f"{MESHFIX} untangle -q"
+    command = f"cat {TANGLED} >{fifo} & {repair} {fifo} /dev/stdout | head -c 5; {repair} {TANGLED} /dev/null"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout, done.stderr) == (0, b"# vtk", b"")
+
+
+def test_coordinates_that_the_file_cannot_hold(tmp_path: Path) -> None:
+    mesh = meshio.read(VALID)
+    meshio.Mesh(mesh.points.astype("f4"), mesh.cells).write(tmp_path / "in.vtk")
+    arguments = ["perturb", "--percent", 20, "--dist", "1e39", tmp_path / "in.vtk", tmp_path / "out.vtk"]
+    assert "too large for the numbers of the file" in error_line(*arguments)
+    assert not (tmp_path / "out.vtk").exists()
+
+
+def test_one_unreadable_mesh_does_not_stop_the_others(tmp_path: Path) -> None:
+    done = run("quality", VALID, tmp_path / "missing.vtk", TANGLED, code=1)
+    assert "plate.vtk" in done.stdout.decode()
+    assert "plate_tangled.vtk" in done.stdout.decode()
+    assert done.stderr.decode().count("\n") == 1
+
+
+def test_elements_that_nothing_can_mend_are_counted(tmp_path: Path) -> None:
+    mesh = meshio.read(VALID)
+    document = read(VALID)
+    simplices = document.mesh.topology.simplices
+    a, b, c = simplices[~document.mesh.movable[simplices].any(axis=1)][0]
+    mesh.points[a] = mesh.points[b] + mesh.points[c] - mesh.points[a]
+    mesh.write(tmp_path / "in.vtk")
+    text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
+    assert "of them with no free vertex" in text
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
@@ -221,6 +280,8 @@ def test_empty_and_unknown_stdin() -> None:
         ["untangle", "--threads", "0", TANGLED, "o.vtk"],
         ["untangle", "--metric", "beauty", TANGLED, "o.vtk"],
         ["untangle", "--format", "xyz", TANGLED, "o.vtk"],
+        ["untangle", "--threshold", "nan", TANGLED, "o.vtk"],
+        ["perturb", "--percent", "nan", "--dist", "h", VALID, "o.vtk"],
         ["perturb", "--percent", "101", "--dist", "h", VALID, "o.vtk"],
         ["perturb", "--percent", "5", "--dist", "-1", VALID, "o.vtk"],
         ["perturb", "--percent", "5", VALID, "o.vtk"],

@@ -151,6 +151,14 @@ def test_collapsed_and_pinched_stars_do_no_harm(mesh: Mesh) -> None:
         assert outcome.records[-1].inverted == outcome.after.check()[0]
 
 
+@pytest.mark.parametrize("strategy", STRATEGIES)
+def test_an_interior_in_one_point_is_solved_in_2d(plate: Mesh, strategy: str) -> None:
+    points = plate.points.copy()
+    points[plate.movable] = [1.5, 1.0]
+    if strategy in ("auto", "LS"):
+        assert untangle(plate.with_points(points), strategy).valid
+
+
 def test_perturb_series_moves_the_same_vertices_in_the_same_directions(bracket: Mesh) -> None:
     moves = {}
     for percent, distance in ((5, 1.0), (25, 1.0), (25, 3.0)):

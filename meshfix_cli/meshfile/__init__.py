@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
 import struct
 import sys
-import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,20 +12,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import MeshfixError, ReadError, WriteError
+from meshfix_cli.errors import InvalidMeshError, MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh import CELL_NAMES, Mesh
 from meshfix_cli.meshfile import formats, gmsh, obj, vtk
 from meshfix_cli.meshfile.atomic import check_target, write_file
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.splice import splice
+from meshfix_cli.meshfile.through_meshio import SIMPLEX, read_bytes, read_path, simplices_of, write_path
 
 __all__ = ["Document", "check_target", "output_format", "read", "write"]
 
 STDIN = "<stdin>"
 REGION_ARRAYS = ("gmsh:physical", "medit:ref", "cell_tags")
 SPLICED = {"gmsh": gmsh.find_coordinates, "obj": obj.find_coordinates, "vtk": vtk.find_coordinates}
-SIMPLEX = {3: "tetra", 2: "triangle"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,19 +68,29 @@ class Document:
             original = original.astype(np.float64)
         points: NDArray[np.floating[Any]] = original.copy()
         moved = (mesh.points != self.mesh.points).any(axis=1)
-        if self.basis is None:
-            points[moved] = mesh.points[moved]
-        elif np.isin(self.basis, (0.0, 1.0)).all():
-            points[np.ix_(moved, self.basis.argmax(axis=1))] = mesh.points[moved]
-        else:
-            points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
+        with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
+            if self.basis is None:
+                points[moved] = mesh.points[moved]
+            elif np.isin(self.basis, (0.0, 1.0)).all():
+                points[np.ix_(moved, self.basis.argmax(axis=1))] = mesh.points[moved]
+            else:
+                points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
         return points
 
     def as_stored(self, mesh: Mesh) -> Mesh:
         """Return a moved mesh with the coordinates rounded as the file will hold them."""
-        points = self.file_points(mesh).astype(np.float64)
-        stored = points if self.basis is None else points @ self.basis.T
-        return mesh.with_points(np.ascontiguousarray(stored))
+        return self.in_plane(self.file_points(mesh).astype(np.float64), mesh)
+
+    def in_plane(self, points: NDArray[np.float64], mesh: Mesh) -> Mesh:
+        """Return a moved mesh at points (n, 2 or 3) in the coordinates of the file."""
+        used = points[mesh.topology.used]
+        if not np.isfinite(used).all():
+            raise InvalidMeshError("the coordinates are too large for the numbers of the file")
+        return mesh.with_points(np.ascontiguousarray(points if self.basis is None else points @ self.basis.T))
+
+    def is_kept_by(self, form: Format) -> bool:
+        """Whether writing in a format keeps all but the coordinates, byte for byte."""
+        return form == self.format and form.reader in SPLICED
 
 
 def read(path: str | os.PathLike[str], fix: str | None = None, regions: str | None = None) -> Document:
@@ -111,15 +118,16 @@ def read(path: str | os.PathLike[str], fix: str | None = None, regions: str | No
         form = formats.sniff(data[: formats.HEAD]) or formats.by_name(Path(name))
         if form is None:
             raise ReadError("the format is not recognised")
-        source = _read_stream(data, form) if name == STDIN else _read_with_meshio(Path(name), form)
+        # A pipe with a name can be read only once, as stdin can.
+        source = read_path(Path(name), form) if Path(name).is_file() else read_bytes(data, form)
         return _document(name, source, data, form, fix, regions)
     except MeshfixError as error:
         text = str(error)
         raise type(error)(text if text.startswith(name) else f"{name}: {text}") from error
 
 
-def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: Format | None = None) -> None:
-    """Write a moved mesh.
+def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: Format | None = None) -> Mesh:
+    """Write a moved mesh; return it as the file holds it.
 
     In the format it came in, every byte outside the coordinates that moved stays as it was where the format is
     one of `SPLICED`; otherwise meshio writes what it knows of the document.
@@ -134,36 +142,37 @@ def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: 
     form : Format, optional
         Default: see `output_format`.
 
+    Returns
+    -------
+    Mesh
+        With the coordinates rounded as the format rounds them.
+
     Raises
     ------
     WriteError
         Nothing was written.
     """
-    import meshio
-
     target = os.fspath(target)
     form = form or output_format(document, target)
     check_target(target)
     points = document.file_points(mesh)
-    spliced = _splice(document, points) if form == document.format else None
-    out = document.source.copy()
-    out.points = points
+    spliced = _splice(document, points) if document.is_kept_by(form) else None
+    stored = document.as_stored(mesh)
 
     def produce(temporary: Path) -> None:
+        nonlocal stored
         if spliced is not None:
             temporary.write_bytes(spliced)
             return
+        out = document.source.copy()
+        out.points = points
         try:
-            with _quiet():
-                meshio.write(temporary, out, file_format=form.name, **formats.options(form))
-        except ImportError as error:
-            raise WriteError(f"{target}: the format {form.name} needs the package {error.name}") from error
-        except OSError:
-            raise
-        except (Exception, SystemExit) as error:  # meshio's writers raise whatever they meet
-            raise WriteError(f"{target}: cannot be written as {form.name}: {_first_line(error)}") from error
+            stored = document.in_plane(write_path(temporary, out, form, mesh.dimension), mesh)
+        except WriteError as error:
+            raise WriteError(f"{target}: {error}") from error
 
-    write_file(target, Path(target).suffix if target != "-" else f".{form.name}", produce)
+    write_file(target, produce)
+    return stored
 
 
 def output_format(document: Document, target: str, name: str | None = None) -> Format:
@@ -214,60 +223,11 @@ def _read_bytes(name: str) -> bytes:
     return data
 
 
-def _read_stream(data: bytes, form: Format) -> Any:
-    with tempfile.TemporaryDirectory(prefix="meshfix-") as folder:
-        path = Path(folder) / "stdin"
-        path.write_bytes(data)
-        return _read_with_meshio(path, form)
-
-
-def _read_with_meshio(path: Path, form: Format) -> Any:
-    import meshio
-
-    try:
-        with _quiet():
-            source = _native(meshio.read(path, file_format=form.reader))
-            missing = formats.missing_part(path, form, sum(len(block.data) for block in source.cells))
-    except ImportError as error:
-        raise ReadError(f"the format {form.name} needs the package {error.name}") from error
-    except (Exception, SystemExit) as error:  # meshio's readers raise whatever they meet, and exit
-        raise ReadError(f"is not a readable {form.name} file ({_first_line(error)})") from error
-    if missing:
-        raise ReadError(f"is truncated: {missing}")
-    return source
-
-
-def _native(source: Any) -> Any:
-    """Turn arrays to the machine's byte order: readers of binary files leave them as they were there."""
-
-    def native(array: Any) -> Any:
-        return array.astype(array.dtype.newbyteorder("=")) if isinstance(array, np.ndarray) else array
-
-    source.points = native(source.points)
-    for block in source.cells:
-        block.data = native(block.data)
-    source.point_data = {name: native(data) for name, data in source.point_data.items()}
-    source.cell_data = {name: [native(data) for data in blocks] for name, blocks in source.cell_data.items()}
-    return source
-
-
-@contextlib.contextmanager
-def _quiet() -> Any:
-    """Swallow what meshio prints."""
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        yield
-
-
-def _first_line(error: BaseException) -> str:
-    lines = str(error).strip().splitlines()
-    return lines[0] if lines else type(error).__name__
-
-
 def _document(name: str, source: Any, data: bytes, form: Format, fix: str | None, regions: str | None) -> Document:
     dimension = _dimension(source)
     starts = np.cumsum([0, *(len(block.data) for block in source.cells)])
     chosen = [i for i, block in enumerate(source.cells) if block.type == SIMPLEX[dimension]]
-    simplices = np.concatenate([source.cells[i].data for i in chosen])
+    simplices = simplices_of(source, dimension)
     ids = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in chosen])
 
     points, basis = _solved_points(source, simplices, dimension)
@@ -285,7 +245,9 @@ def _document(name: str, source: Any, data: bytes, form: Format, fix: str | None
         counted = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
         fixed[reason] = int(counted.sum())
         mesh = mesh.with_fixed(mask)
-    notes = _notes(mesh, len(simplices))
+    # A plane in space has no side from which the numbering could be judged, but for that of constant z.
+    seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
+    notes = _notes(mesh, len(simplices), seen_from_above)
     return Document(
         name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, data, basis
     )
@@ -317,7 +279,7 @@ def _solved_points(
     used = points[np.unique(simplices)]
     if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
         return flat, None
-    basis = plane_basis(used)
+    basis = plane_basis(used, np.finfo(source.points.dtype).eps if source.points.dtype.kind == "f" else 0.0)
     with np.errstate(invalid="ignore"):  # isolated points may be anything
         return points @ basis.T, basis
 
@@ -351,19 +313,26 @@ def _region_arrays(source: Any, name: str | None) -> list[str]:
     return [name]
 
 
-def _notes(mesh: Mesh, rows: int) -> tuple[str, ...]:
-    topology, cells = mesh.topology, CELL_NAMES[mesh.dimension][1]
+def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
+    topology, (one, many) = mesh.topology, CELL_NAMES[mesh.dimension]
+
+    def count(number: int, singular: str, plural: str) -> str:
+        return f"{number:,} {singular if number == 1 else plural}"
+
     notes = []
     if len(topology.simplices) < rows:
-        notes.append(f"{rows - len(topology.simplices):,} {cells} are listed more than once; each counts once")
+        repeated = count(rows - len(topology.simplices), f"{one} is a repetition", f"{many} are repetitions")
+        notes.append(f"{repeated} of another and not counted")
     isolated = topology.n - int(topology.used.sum())
     if isolated:
-        notes.append(f"{isolated:,} points belong to no element and are kept as they are")
+        notes.append(f"{count(isolated, 'point belongs', 'points belong')} to no {one} and stay as they are")
     components = int(topology.component.max()) + 1
     mirrored = topology.mirrored_components
-    if mirrored:
-        which = "all elements are" if components == 1 else f"{mirrored:,} of {components:,} components are"
-        notes.append(f"{which} numbered the other way round (mirrored); solved so, the numbering is kept")
+    if mirrored == components > 0 and seen_from_above:
+        notes.append("all elements are numbered the other way round (mirrored); solved so, the numbering is kept")
+    elif 0 < mirrored < components:
+        which = count(mirrored, "component is", "components are")
+        notes.append(f"of {components:,} components {which} numbered the other way round; solved so")
     if not mesh.movable.any():
         notes.append("no vertex is free to move")
     return tuple(notes)

@@ -19,40 +19,37 @@ def check_target(target: str) -> None:
     path = Path(target)
     if path.is_dir():
         raise WriteError(f"{target}: is a directory")
-    if not path.resolve().parent.is_dir():
-        raise WriteError(f"{target}: the directory does not exist")
     if _is_special(path):
         return
+    if not path.resolve().parent.is_dir():
+        raise WriteError(f"{target}: the directory does not exist")
     if not os.access(path.resolve().parent, os.W_OK):
         raise WriteError(f"{target}: the directory is not writable")
 
 
-def write_file(target: str, suffix: str, produce: Callable[[Path], None]) -> None:
+def write_file(target: str, produce: Callable[[Path], None]) -> None:
     """Let `produce` write a temporary file, then put it in the place of `target` at once ("-": stdout).
 
-    The temporary file is in the target's directory, so the replacement is one rename; symbolic links are
-    followed and the mode of an existing file is kept.
+    The temporary file is in a folder of its own beside the target, so the replacement is one rename; symbolic
+    links are followed and the mode of an existing file is kept.
     """
-    path = Path(target).resolve()
-    streamed = target == "-" or _is_special(path)
-    handle, name = tempfile.mkstemp(prefix=".meshfix-", suffix=suffix, dir=None if streamed else path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    streamed = target == "-" or _is_special(Path(target))
+    path = Path(target) if streamed else Path(target).resolve()
     try:
-        produce(temporary)
-        if target == "-":
-            sys.stdout.buffer.write(temporary.read_bytes())
-            sys.stdout.buffer.flush()
-        elif streamed:
-            path.write_bytes(temporary.read_bytes())
-        else:
-            _replace(temporary, path)
+        with tempfile.TemporaryDirectory(prefix=".meshfix-", dir=None if streamed else path.parent) as folder:
+            temporary = Path(folder) / (path.name if path.suffix else "mesh")
+            produce(temporary)
+            if target == "-":
+                sys.stdout.buffer.write(temporary.read_bytes())
+                sys.stdout.buffer.flush()
+            elif streamed:
+                path.write_bytes(temporary.read_bytes())
+            else:
+                _replace(temporary, path)
     except BrokenPipeError:  # nobody reads stdout any more: the command line knows what that means
         raise
     except OSError as error:
         raise WriteError(f"{target}: {error.strerror or error}") from error
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def _replace(temporary: Path, path: Path) -> None:

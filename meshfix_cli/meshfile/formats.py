@@ -92,4 +92,6 @@ def options(form: Format) -> dict[str, object]:
     """Keyword arguments for meshio's writer."""
     if form.name == "xdmf":
         return {"data_format": "XML"}  # else the numbers go to a second file
+    if form.name == "vtu":
+        return {"binary": True}  # meshio's text has 12 digits, which would move fixed vertices
     return {} if form.binary is None else {"binary": form.binary}

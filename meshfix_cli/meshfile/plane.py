@@ -11,11 +11,17 @@ from meshfix_cli.errors import ReadError
 FLAT = 1e-6
 
 
-def plane_basis(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np.float64]:
     """Return two orthonormal vectors (2, 3) that span the plane of the points (n, 3).
 
     Of the two sides the one with the positive largest coordinate of the normal is seen, so a mesh in a plane of
     constant z is seen from above. Planes along the axes give exact unit vectors.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+    epsilon : float
+        Relative rounding of the coordinates in the file: far from the origin it bends a plane.
 
     Raises
     ------
@@ -23,15 +29,16 @@ def plane_basis(points: NDArray[np.float64]) -> NDArray[np.float64]:
         The points do not lie in one plane, or lie on one line.
     """
     size = float(np.ptp(points, axis=0).max())
-    constant = np.ptp(points, axis=0) <= FLAT * size
-    if constant.sum() == 1:
-        normal = np.argmax(constant)
-        return np.eye(3)[[(normal + 1) % 3, (normal + 2) % 3]]
+    flat = FLAT + 4 * epsilon * float(np.abs(points).max()) / size
+    spread = np.ptp(points, axis=0)
+    thin = int(np.argmin(spread))
+    if spread[thin] <= flat * size and np.partition(spread, 1)[1] > 0.0:
+        return np.eye(3)[[(thin + 1) % 3, (thin + 2) % 3]]
     centred = (points - points.mean(axis=0)) / size
     _, axes = np.linalg.eigh(centred.T @ centred)
     normal_vector = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
-    if np.abs(centred @ normal_vector).max() > FLAT:
+    if np.abs(centred @ normal_vector).max() > flat:
         raise ReadError("the triangles form a curved surface; only meshes in a plane, or tetrahedra, can be untangled")
-    if np.ptp(centred @ axes[:, 1]) <= FLAT:
+    if np.ptp(centred @ axes[:, 1]) <= flat:
         raise ReadError("all vertices lie on one line")
     return np.stack([axes[:, 2], np.cross(normal_vector, axes[:, 2])])

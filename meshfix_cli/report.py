@@ -240,9 +240,7 @@ def _verdict(report: Report) -> list[str]:
         lines.append(text + (f"; the first {LISTED}:" if count > LISTED else ":"))
         lines += [f"  cell {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
         if report.stuck:
-            lines.append(
-                f"{report.stuck:,} of them with no free vertex: the fixed ones, such as the boundary, are wrong"
-            )
+            lines.append(f"{report.stuck:,} of them without a free vertex: the fixed ones are wrong")
     if report.misnumbered:
         first = report.ids[np.flatnonzero(report.mesh.topology.mixed_numbering)[:LISTED]].tolist()
         some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > LISTED else "")

@@ -245,7 +245,7 @@ def test_elements_that_nothing_can_mend_are_counted(tmp_path: Path) -> None:
     mesh.points[a] = mesh.points[b] + mesh.points[c] - mesh.points[a]
     mesh.write(tmp_path / "in.vtk")
     text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
-    assert "of them with no free vertex" in text
+    assert "of them without a free vertex" in text
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

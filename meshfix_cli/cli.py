@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from meshfix_cli.meshfile.formats import Format
     from meshfix_cli.report import Report
 
-VALID, ERROR, INVERTED = 0, 1, 3  # 2, wrong usage, is click's
+VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]
@@ -60,6 +60,9 @@ class _Group(click.Group):
     """Errors are one line on stderr and an exit code, never a traceback."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+            if getattr(sys, name) is None:  # closed by the shell: >&-
+                setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 (for the whole run)
         try:
             return super().invoke(ctx)
         except MeshfixError as error:
@@ -223,7 +226,9 @@ _reporting = _packed(
     click.option("--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),
     click.option("--json", "as_json", is_flag=True, help="Report as one JSON object."),
     click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
-    click.option("--threads", type=click.IntRange(1), default=_cores, help="Default: the cores this process may use."),
+    click.option(
+        "--threads", type=click.IntRange(1, 1024), default=_cores, help="Default: the cores this process may use."
+    ),
 )
 _writing = _packed(
     "files",
@@ -280,9 +285,12 @@ def untangle(
     from meshfix_cli.untangle import collect, plan, steps
 
     document, output = files.open(held, history)
-    run = steps(document.mesh, plan(strategy, sweeps, smooth), threshold, show.threads)
+    run = steps(document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, threads=show.threads)
     outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)))
-    result, notes = files.write(document, outcome.after, output)
+    after = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
+    result, notes = files.write(document, after, output)
+    if after is not outcome.after:
+        notes += ("smoothed positions, rounded as the file stores them, invert elements: written as before",)
     if history is not None:
         _write_text(history, history_csv(outcome.records))
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
@@ -332,7 +340,7 @@ def quality(sources: tuple[str, ...], held: _Held, show: _Show) -> None:
         report = show.report("quality", document, {"mesh": document.mesh})
         show.print(report, sys.stdout)
         codes.add(VALID if report.valid else INVERTED)
-    sys.exit(ERROR if ERROR in codes else max(codes))
+    sys.exit(max(codes) if ERROR not in codes else SOME_FAILED if len(sources) > 1 else ERROR)
 
 
 def _write_text(target: str, text: str) -> None:

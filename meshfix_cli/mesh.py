@@ -58,7 +58,10 @@ class Topology:
     @cached_property
     def stars(self) -> _kernels.Stars:
         """Incidence, neighbours, blocks and block colours."""
-        return _kernels.Stars(self.simplices, self.n)
+        try:
+            return _kernels.Stars(self.simplices, self.n)
+        except ValueError as error:  # a star, or the mesh, is too large to be numbered
+            raise InvalidMeshError(str(error)) from error
 
     @cached_property
     def colours(self) -> list[NDArray[np.int32]]:
@@ -75,18 +78,15 @@ class Topology:
         """(n,) bool: vertices of facets that belong to one simplex."""
         return self._mark_facets(self.mates < 0)
 
-    @cached_property
-    def mixed_numbering(self) -> NDArray[np.bool_]:
-        """(m,) bool: simplices numbered against most of their component (by count, the fewer are to blame)."""
-        size = np.bincount(self.component)
-        flipped = np.bincount(self.component, weights=self.flipped)
-        mostly_flipped = (flipped > size / 2)[self.component]
-        return self.flipped != mostly_flipped
+    @property
+    def mirrored(self) -> bool:
+        """The user's numbering has, for most simplices, the other orientation."""
+        return bool(self.flipped.mean() > 0.5)
 
     @cached_property
-    def mirrored_components(self) -> int:
-        """Number of components that are, as a whole, numbered the other way round."""
-        return len(np.unique(self.component[self.flipped & ~self.mixed_numbering]))
+    def misnumbered(self) -> NDArray[np.bool_]:
+        """(m,) bool: simplices numbered against most of the mesh: inverted for whoever reads the file."""
+        return self.flipped != self.mirrored
 
     def interface(self, regions: ArrayLike) -> NDArray[np.bool_]:
         """(n,) bool: vertices of facets between simplices of different regions; `regions` (m,) labels."""
@@ -164,7 +164,9 @@ class Mesh:
         return self.points.shape[1]
 
     def with_points(self, points: NDArray[np.float64]) -> Mesh:
-        """Return the same mesh with other positions; the array becomes read-only."""
+        """Return the same mesh with other positions (n, d) float64; the array becomes read-only."""
+        if points.shape != self.points.shape or points.dtype != np.float64:
+            raise ValueError(f"points have the shape {points.shape}, and this mesh {self.points.shape}")
         return replace(self, points=_read_only(points))
 
     def with_fixed(self, fixed: NDArray[np.bool_]) -> Mesh:

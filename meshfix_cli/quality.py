@@ -30,13 +30,10 @@ class Metric:
         (edges (m, d, d), signed measure (m,)) -> (m,); edges[:, k] leads from vertex 0 to vertex k+1.
     worst : {"min", "max"}
         Which end of its range is bad.
-    label, source : str
     """
 
     evaluate: Callable[[Array, Array], Array]
     worst: Literal["min", "max"]
-    label: str
-    source: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +89,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summ
         mean_min_angle=float(smallest.mean()),
         percentile_1=float(np.percentile(smallest, 1)),
         histogram=tuple(np.histogram(smallest, bins, (0.0, bins * BIN_WIDTH))[0].tolist()),
-        metrics={name: _worst_and_mean(METRICS[name], mesh) for name in metrics},
+        metrics={name: _worst_and_mean(name, mesh) for name in metrics},
         inverted_elements=inverted_elements,
     )
 
@@ -110,12 +107,14 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     p = mesh.points[mesh.topology.simplices]
     measure = _kernels.measure(mesh.points, mesh.topology.simplices, 1)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return METRICS[name].evaluate(p[:, 1:] - p[:, :1], measure)
+        values = METRICS[name].evaluate(p[:, 1:] - p[:, :1], measure)
+    # 0 / 0: nothing is left of the simplex.
+    return np.where(np.isnan(values), 0.0 if METRICS[name].worst == "min" else np.inf, values)
 
 
-def _worst_and_mean(metric: Metric, mesh: Mesh) -> tuple[float, float]:
-    values = evaluate(next(name for name, m in METRICS.items() if m is metric), mesh)
-    return float(values.min() if metric.worst == "min" else values.max()), float(values.mean())
+def _worst_and_mean(name: str, mesh: Mesh) -> tuple[float, float]:
+    values = evaluate(name, mesh)
+    return float(values.min() if METRICS[name].worst == "min" else values.max()), float(values.mean())
 
 
 def _lengths(edges: Array) -> Array:
@@ -196,13 +195,13 @@ def _radius_ratio(edges: Array, measure: Array) -> Array:
     return np.where(measure > 0, ratio, np.inf)
 
 
-_VERDICT = "Stimpson, Ernst, Knupp, Pebay, Thompson, The Verdict Geometric Quality Library, SAND2007-1751"
-
+# Source of all but the sine: Stimpson, Ernst, Knupp, Pebay, Thompson, "The Verdict Geometric Quality Library",
+# SAND2007-1751. A regular simplex has 1, but for the first two.
 METRICS: dict[str, Metric] = {
-    "min_angle": Metric(_min_angle, "min", "smallest angle in degrees, dihedral for tetrahedra", _VERDICT),
-    "min_sine": Metric(_min_sine, "min", "smallest sine of an angle, with the sign of the measure", "equation (3.2)"),
-    "aspect_ratio": Metric(_aspect_ratio, "max", "longest edge / inradius, 1 if regular", _VERDICT),
-    "scaled_jacobian": Metric(_scaled_jacobian, "min", "Jacobian / edges of a corner, 1 if regular", _VERDICT),
-    "mean_ratio": Metric(_mean_ratio, "min", "Verdict's shape, 1 if regular, 0 inverted", _VERDICT),
-    "radius_ratio": Metric(_radius_ratio, "max", "circumradius / (d inradius), 1 if regular", _VERDICT),
+    "min_angle": Metric(_min_angle, "min"),  # degrees, without sign; dihedral for tetrahedra
+    "min_sine": Metric(_min_sine, "min"),  # equation (3.2), with the sign of the measure
+    "aspect_ratio": Metric(_aspect_ratio, "max"),  # longest edge / inradius
+    "scaled_jacobian": Metric(_scaled_jacobian, "min"),  # Jacobian / edges at the worst corner
+    "mean_ratio": Metric(_mean_ratio, "min"),  # Verdict's shape; 0 where inverted
+    "radius_ratio": Metric(_radius_ratio, "max"),  # circumradius / (d inradius)
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -70,8 +69,8 @@ class Report:
 
     @property
     def misnumbered(self) -> int:
-        """Elements numbered against their neighbours: inverted for whoever reads the file, whatever their shape."""
-        return int(self.mesh.topology.mixed_numbering.sum())
+        """Elements numbered against the rest of the mesh: inverted for whoever reads the file, whatever their shape."""
+        return int(self.mesh.topology.misnumbered.sum())
 
     @property
     def stuck(self) -> int:
@@ -85,9 +84,8 @@ class Report:
         return self.result.inverted == 0 and self.misnumbered == 0
 
 
-def console(stream: Any = None) -> Console:
+def console(stream: Any) -> Console:
     """Return a console for a stream; plain text of 100 columns where that is not a terminal."""
-    stream = stream or sys.stdout
     if hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
     return Console(file=stream, width=None if stream.isatty() else 100, highlight=False)
@@ -150,7 +148,7 @@ def with_progress(run: Iterable[tuple[Mesh, SweepRecord]], out: Console) -> Iter
     if not out.is_terminal:
         yield from run
         return
-    with out.status("reading the stars") as status:
+    with out.status("building the topology") as status:
         for mesh, record in run:
             status.update(f"{record.phase} {record.sweep}: {record.inverted:,} inverted")
             yield mesh, record
@@ -242,10 +240,11 @@ def _verdict(report: Report) -> list[str]:
         if report.stuck:
             lines.append(f"{report.stuck:,} of them without a free vertex: the fixed ones are wrong")
     if report.misnumbered:
-        first = report.ids[np.flatnonzero(report.mesh.topology.mixed_numbering)[:LISTED]].tolist()
+        first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[:LISTED]].tolist()
         some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > LISTED else "")
-        what = "element is numbered against its" if report.misnumbered == 1 else "elements are numbered against their"
-        lines.append(f"NOT VALID: {report.misnumbered:,} {what} neighbours (cell {some}); meshfix keeps the numbering")
+        what = "element is" if report.misnumbered == 1 else "elements are"
+        text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (cell {some})"
+        lines.append(f"{text}; meshfix keeps the numbering")
     return lines
 
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from itertools import count
 from typing import TYPE_CHECKING, Literal
 
 from meshfix_cli import _kernels
@@ -44,7 +45,7 @@ class Phase:
         As shown in the report.
     move : Move
     max_sweeps : int or None
-        None: as many as the strategy's limit leaves.
+        None: as many as the limit of all untangling sweeps leaves.
     until : {"valid", "stalled", "settled"}
         When to stop early. "valid": no element is inverted; "stalled": as well, or their number has not fallen
         below the best for `PATIENCE` sweeps;
@@ -122,22 +123,22 @@ class Outcome:
 
     @property
     def valid(self) -> bool:
-        """No element of the result is inverted."""
-        return self.records[-1].inverted == 0
+        """No element of the result is inverted, by its shape or by its numbering."""
+        return self.records[-1].inverted == 0 and not self.after.topology.misnumbered.any()
 
 
-def plan(strategy: str, sweeps: int = SWEEPS, smooth: int = SMOOTH) -> tuple[Phase, ...]:
-    """Return the phases of a strategy, limited to `sweeps` sweeps in all, and `smooth` smoothing passes."""
-    phases = []
-    for phase in STRATEGIES[strategy]:
-        allowed = sweeps if phase.max_sweeps is None else min(phase.max_sweeps, sweeps)
-        sweeps -= allowed
-        phases.append(replace(phase, max_sweeps=allowed))
-    return (*phases, Phase(SMOOTHING, Move.COMBINED_SMOOTH, smooth, until="settled", from_best=True))
+def plan(strategy: str, smooth: int = SMOOTH) -> tuple[Phase, ...]:
+    """Return the phases of a strategy, and `smooth` smoothing passes."""
+    return (*STRATEGIES[strategy], Phase(SMOOTHING, Move.COMBINED_SMOOTH, smooth, until="settled", from_best=True))
 
 
 def steps(
-    mesh: Mesh, phases: Iterable[Phase], threshold: float | None = None, threads: int = 1
+    mesh: Mesh,
+    phases: Iterable[Phase],
+    *,
+    sweeps: int = SWEEPS,
+    threshold: float | None = None,
+    threads: int = 1,
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
     """Run the phases; yield the mesh and a record as it came and after each sweep.
 
@@ -146,8 +147,11 @@ def steps(
 
     Parameters
     ----------
+    sweeps : int
+        Limit of the untangling sweeps, all phases together.
     threshold : float, optional
         Degrees; the active-set method runs on stars with a smaller angle. Default: `THRESHOLD`.
+    threads : int
 
     Notes
     -----
@@ -164,9 +168,11 @@ def steps(
             mesh, record = best[0], replace(best[1], phase="best", moved=0, seconds=0.0)
             yield mesh, record
         waited = 0
-        for number in range(1, (phase.max_sweeps or 0) + 1):
-            if phase.until != "settled" and record.inverted == 0:
-                break
+        for number in count(1) if phase.max_sweeps is None else range(1, phase.max_sweeps + 1):
+            if phase.until != "settled":
+                if record.inverted == 0 or sweeps == 0:
+                    break
+                sweeps -= 1
             mesh, record = _sweep(mesh, phase, number, math.sin(math.radians(degrees)) ** 2, threads)
             waited = 0 if record.inverted < best[1].inverted else waited + 1
             best = min(best, (mesh, record), key=lambda pair: pair[1].rank)
@@ -238,6 +244,7 @@ def untangle(
 
     Notes
     -----
-    Source: section 4 for LS, US, CS and LUS. "auto" is LUS with the LP only where a star is still invalid.
+    Source: section 4 for LS, US, CS and LUS. "auto" is Laplacian sweeps until they stall, then, from the best of
+    those meshes, LP sweeps on the stars that are still invalid.
     """
-    return collect(steps(mesh, plan(strategy, sweeps, smooth), threshold, threads))
+    return collect(steps(mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, threads=threads))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import generate
@@ -72,9 +71,6 @@ def random_star(
     moved = points * random.uniform(1 - spread, 1 + spread, (len(points), 1))
     moved += spread * random.standard_normal(points.shape)
     return np.ascontiguousarray(moved / np.abs(moved).max()), faces.astype(np.uint16)
-
-
-Rotate = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 @pytest.fixture

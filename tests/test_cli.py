@@ -12,10 +12,11 @@ import meshio
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from conftest import SAMPLES
+from conftest import SAMPLES, tangle
 
 from meshfix_cli import read
 from meshfix_cli.cli import main
+from meshfix_cli.mesh import Mesh
 from meshfix_cli.quality import METRICS
 from meshfix_cli.untangle import STRATEGIES
 
@@ -108,7 +109,7 @@ def test_elements_numbered_against_their_neighbours_are_not_called_valid(tmp_pat
     mesh.cells[0].data[3] = mesh.cells[0].data[3][::-1]
     mesh.write(tmp_path / "in.vtk")
     text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
-    assert "NOT VALID: 1 element is numbered against its neighbours (cell 3); meshfix keeps the numbering" in text
+    assert "NOT VALID: 1 element is numbered against the rest of the mesh (cell 3)" in text
 
 
 def test_quiet_dry_run_and_history(tmp_path: Path) -> None:
@@ -121,10 +122,11 @@ def test_quiet_dry_run_and_history(tmp_path: Path) -> None:
     assert "valid" in run("untangle", "--dry-run", TANGLED).stdout.decode()
 
 
-def test_same_bytes_for_any_number_of_threads(tmp_path: Path) -> None:
+def test_same_bytes_for_any_number_of_threads(tmp_path: Path, fine: Mesh) -> None:
+    meshio.Mesh(tangle(fine).points, [("tetra", fine.topology.simplices)]).write(tmp_path / "in.vtk")
     outputs = set()
     for threads in (1, 2, 3):
-        run("untangle", "--quiet", "--threads", threads, SAMPLES / "bracket_tangled.vtk", tmp_path / "out.vtk")
+        run("untangle", "--quiet", "--threads", threads, tmp_path / "in.vtk", tmp_path / "out.vtk")
         outputs.add((tmp_path / "out.vtk").read_bytes())
     assert len(outputs) == 1
 
@@ -222,6 +224,31 @@ def test_pipes_and_devices_with_names(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, b"# vtk", b"")
 
 
+@pytest.mark.parametrize("streams", ["2>&-", ">&-", "<&-", "<&- >&- 2>&-"])
+def test_closed_streams(streams: str, tmp_path: Path) -> None:
+    command = f"{MESHFIX} untangle {TANGLED} {tmp_path / 'out.vtk'} {streams}"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, check=False)
+    assert done.returncode == 0
+    assert b"Traceback" not in done.stdout + done.stderr
+    assert read(tmp_path / "out.vtk").mesh.check()[0] == 0
+    piped = subprocess.run(["bash", "-c", f"{MESHFIX} untangle {TANGLED} 2>&-"], capture_output=True, check=False)
+    assert piped.stdout == (tmp_path / "out.vtk").read_bytes()
+
+
+def test_options_of_holding_and_smoothing_reach_the_work(tmp_path: Path) -> None:
+    mesh = meshio.read(VALID)
+    inner = np.flatnonzero(read(VALID).mesh.movable)
+    mesh.point_data["hold"] = np.isin(np.arange(len(mesh.points)), inner[:7]).astype(float)
+    mesh.cell_data["part"] = [(mesh.points[mesh.cells[0].data].mean(axis=1)[:, 0] > 1.5).astype(float)]
+    mesh.write(tmp_path / "in.vtk")
+    options = ["--json", "--dry-run", "--fix", "hold", "--regions", "part", "--smooth", 1, "--threshold", 0]
+    facts = json.loads(run("untangle", *options, tmp_path / "in.vtk").stdout)
+    assert facts["fixed"]["by --fix hold"] + facts["fixed"]["between regions of part"] > 10
+    assert [sweep["phase"] for sweep in facts["sweeps"]] == ["input", "smoothing"]
+    moved = [run("perturb", "--percent", 20, "--dist", "h", "--seed", s, "-q", VALID).stdout for s in (0, 0, 1)]
+    assert moved[0] == moved[1] != moved[2]
+
+
 def test_coordinates_that_the_file_cannot_hold(tmp_path: Path) -> None:
     mesh = meshio.read(VALID)
     meshio.Mesh(mesh.points.astype("f4"), mesh.cells).write(tmp_path / "in.vtk")
@@ -231,7 +258,7 @@ def test_coordinates_that_the_file_cannot_hold(tmp_path: Path) -> None:
 
 
 def test_one_unreadable_mesh_does_not_stop_the_others(tmp_path: Path) -> None:
-    done = run("quality", VALID, tmp_path / "missing.vtk", TANGLED, code=1)
+    done = run("quality", VALID, tmp_path / "missing.vtk", TANGLED, code=4)
     assert "plate.vtk" in done.stdout.decode()
     assert "plate_tangled.vtk" in done.stdout.decode()
     assert done.stderr.decode().count("\n") == 1
@@ -278,6 +305,7 @@ def test_empty_and_unknown_stdin() -> None:
         ["untangle", "--smooth", "x", TANGLED, "o.vtk"],
         ["untangle", "--threshold", "91", TANGLED, "o.vtk"],
         ["untangle", "--threads", "0", TANGLED, "o.vtk"],
+        ["untangle", "--threads", "3000000000", TANGLED, "o.vtk"],
         ["untangle", "--metric", "beauty", TANGLED, "o.vtk"],
         ["untangle", "--format", "xyz", TANGLED, "o.vtk"],
         ["untangle", "--threshold", "nan", TANGLED, "o.vtk"],

@@ -37,7 +37,7 @@ def highs(points: NDArray[np.float64], faces: NDArray[np.uint16]) -> float:
     matrix = np.hstack([-gradients, np.ones((len(values), 1))])[kept]
     result = linprog(
         [0] * d + [-1], matrix, values[kept], bounds=[(-box, box)] * d + [(None, None)], method="highs",
-        options={"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
+        options={"presolve": False, "primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )  # fmt: skip
     assert result.status == 0
     return float(-result.fun)

@@ -66,8 +66,8 @@ def test_mirrored_mesh_is_solved_in_its_own_orientation(mesh: Mesh) -> None:
     simplices = tangled.topology.simplices[:, [1, 0, *range(2, mesh.dimension + 1)]]
     mirrored = Mesh.build(tangled.points, simplices)
     assert mirrored.topology.flipped.all()
-    assert mirrored.topology.mirrored_components == 1
-    assert not mirrored.topology.mixed_numbering.any()
+    assert mirrored.topology.mirrored
+    assert not mirrored.topology.misnumbered.any()
     np.testing.assert_array_equal(mirrored.topology.simplices, tangled.topology.simplices)
     assert untangle(mirrored).after.points.tobytes() == untangle(tangled).after.points.tobytes()
     reflected = Mesh.build(tangled.points * ([-1] + [1] * (mesh.dimension - 1)), tangled.topology.simplices)
@@ -79,8 +79,9 @@ def test_elements_numbered_against_their_neighbours_are_told_apart(mesh: Mesh) -
     odd = [3, 50, 51, 200]
     simplices[odd] = simplices[odd][:, [1, 0, *range(2, mesh.dimension + 1)]]
     mixed = Mesh.build(mesh.points, simplices)
-    assert np.flatnonzero(mixed.topology.mixed_numbering).tolist() == odd
+    assert np.flatnonzero(mixed.topology.misnumbered).tolist() == odd
     assert mixed.check()[0] == 0
+    assert not untangle(mixed).valid  # a solver that reads the file finds negative elements
     assert summarise(mixed).folded == 0
 
 
@@ -92,7 +93,9 @@ def test_swapping_vertices_does_not_hide_a_tangle(plate: Mesh) -> None:
     simplices[bad] = simplices[bad][:, [1, 0, 2]]
     hidden = Mesh.build(tangled.points, simplices)
     assert hidden.check()[0] == len(bad)
-    assert untangle(hidden).valid
+    outcome = untangle(hidden)
+    assert outcome.records[-1].inverted == 0
+    assert not outcome.valid  # the numbering is still that of the file
 
 
 def test_components_of_either_orientation() -> None:
@@ -101,8 +104,25 @@ def test_components_of_either_orientation() -> None:
         [*FAN, *[[b + 5, a + 5, c + 5] for a, b, c in FAN]],
     )
     assert mesh.check()[0] == 0
-    assert mesh.topology.mirrored_components == 1
     assert len(np.unique(mesh.topology.component)) == 2
+    assert not mesh.topology.mirrored
+    assert np.flatnonzero(mesh.topology.misnumbered).tolist() == [4, 5, 6, 7]
+
+
+def test_a_star_too_large_to_number_is_refused() -> None:
+    turn = np.linspace(0, 2 * np.pi, 70001)[:-1]
+    points = np.concatenate([[[0.0, 0.0]], np.column_stack([np.cos(turn), np.sin(turn)])])
+    around = np.arange(1, 70001)
+    mesh = Mesh.build(points, np.column_stack([0 * around, around, np.roll(around, -1)]))
+    assert mesh.check()[0] == 0
+    with pytest.raises(InvalidMeshError, match="65,535 neighbours"):
+        untangle(mesh)
+
+
+def test_points_of_another_shape_are_refused(plate: Mesh) -> None:
+    for points in (plate.points[:5], plate.points.astype("f4"), np.zeros((plate.topology.n, 3))):
+        with pytest.raises(ValueError, match="points have the shape"):
+            plate.with_points(points)
 
 
 def test_repeated_simplices_count_once() -> None:

@@ -82,6 +82,19 @@ def test_what_float32_stores_is_what_is_judged(tmp_path: Path) -> None:
     assert document.as_stored(inside).points[4].tolist() == [np.float32(1e3 + 0.005)] * 2
 
 
+def test_rounding_never_makes_a_valid_file_worse(tmp_path: Path) -> None:
+    """Integers are all that float32 holds at 2^23: the better shape, rounded, is inverted, so nothing moves."""
+    rim = np.array([[3, 2], [3, 4], [-2, 0], [-3, -5], [-1, -2], [-2, -5], [0, 0]]) + 2.0**23
+    points = np.column_stack([rim, np.zeros(7)]).astype("f4")
+    fan = [[i, (i + 1) % 6, 6] for i in range(6)]
+    path = tmp_path / "coarse.vtk"
+    meshio.Mesh(points, [("triangle", fan)]).write(path)
+    document = read(path)
+    outcome = untangle(document.mesh)
+    chosen = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
+    assert document.as_stored(chosen).check()[0] <= document.mesh.check()[0]
+
+
 @pytest.mark.parametrize("angles", [(0, 0, 0), (90, 0, 0), (0, 90, 0), (25, -40, 70)])
 def test_a_mesh_in_any_plane_is_solved_in_that_plane(tmp_path: Path, plate: Mesh, angles: tuple[float, ...]) -> None:
     turn = Rotation.from_euler("xyz", angles, degrees=True).as_matrix()
@@ -143,6 +156,37 @@ def test_fix_and_regions_name_arrays(tmp_path: Path, plate: Mesh) -> None:
         read(path, regions="nope")
 
 
+def test_elements_in_two_groups_keep_the_interface_of_their_materials(tmp_path: Path, bracket: Mesh) -> None:
+    """gmsh 2.2 lists an element once for each of its groups: here all are in 9, and in 1 or 2."""
+    tets = bracket.topology.simplices
+    own = 1 + (bracket.points[tets].mean(axis=1)[:, 1] > 1.0).astype(np.int64)
+    cells = [("tetra", tets), ("tetra", tets)]
+    data = {"gmsh:physical": [np.full(len(tets), 9), own], "gmsh:geometrical": [own, own]}
+    path = tmp_path / "in.msh"
+    meshio.Mesh(bracket.points, cells, cell_data=data).write(path, file_format="gmsh22", binary=False)
+    held = bracket.movable & ~read(path).mesh.movable
+    np.testing.assert_array_equal(held, bracket.movable & bracket.topology.interface(own))
+    assert held.any()
+
+
+def test_regions_are_one_label_for_each_element(tmp_path: Path, plate: Mesh) -> None:
+    m = len(plate.topology.simplices)
+    path = save(tmp_path / "in.vtk", plate, cell_data={"velocity": [np.ones((m, 3))], "gap": [np.full(m, np.nan)]})
+    with pytest.raises(ReadError, match="'velocity' are not labels of regions: they have 3 components"):
+        read(path, regions="velocity")
+    assert "between regions of gap" not in read(path, regions="gap").fixed
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".su2"])
+def test_truncated_files_of_other_formats(suffix: str, tmp_path: Path, plate: Mesh, bracket: Mesh) -> None:
+    whole = save(tmp_path / f"whole{suffix}", bracket if suffix == ".su2" else plate).read_bytes()
+    path = tmp_path / f"cut{suffix}"
+    for share in (0.03, 0.3, 0.5, 0.8):
+        path.write_bytes(whole[: int(share * len(whole))])
+        with pytest.raises((ReadError, InvalidMeshError)):
+            read(path)
+
+
 def test_ids_count_all_cells_of_the_file(tmp_path: Path, plate: Mesh) -> None:
     cells = [("line", [[0, 1], [1, 2]]), ("triangle", plate.topology.simplices)]
     path = tmp_path / "in.vtk"
@@ -158,7 +202,7 @@ def test_notes_tell_what_a_user_should_know(tmp_path: Path, plate: Mesh) -> None
     notes = " / ".join(read(path).notes)
     assert "2 triangles are repetitions of another" in notes
     assert "1 point belongs to no triangle" in notes
-    assert "all elements are numbered the other way round" in notes
+    assert "the elements are numbered the other way round" in notes
 
 
 @pytest.mark.parametrize(

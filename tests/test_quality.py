@@ -86,6 +86,15 @@ def test_regular_simplex_is_best_and_inverted_is_worst(name: str, d: int) -> Non
     assert evaluate(name, mirrored)[0] == pytest.approx(bad.get(name, np.inf))
 
 
+@pytest.mark.parametrize("name", METRICS)
+def test_a_collapsed_element_has_the_worst_value(plate: Mesh, name: str) -> None:
+    points = plate.points.copy()
+    points[plate.topology.simplices[0]] = points[plate.topology.simplices[0][0]]
+    worst, mean = summarise(plate.with_points(points), [name]).metrics[name]
+    assert worst == np.inf if METRICS[name].worst == "max" else worst <= 0.0
+    assert not np.isnan(mean)
+
+
 def test_summary_of_a_tangled_mesh(mesh: Mesh) -> None:
     tangled = tangle(mesh)
     summary = summarise(tangled, ["mean_ratio"])

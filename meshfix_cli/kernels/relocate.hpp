@@ -23,8 +23,7 @@ struct Counts {
 template <int D>
 struct Relocation {
     StarsView stars;
-    double* points;                // (n, D), moved in place
-    const std::uint8_t* movable;   // (n,)
+    double* points;  // (n, D), moved in place
     Parameters parameters;
 
     Star<D> star{};
@@ -69,7 +68,7 @@ struct Relocation {
     void relocate(Move move, std::int64_t v, Counts& counts) {
         if (move == Move::laplacian && !parameters.only_invalid) {
             ++counts.visited;
-            counts.moved += store(v, laplacian<D>(stars, points, v));
+            counts.moved += store(v, centroid<D>(stars, points, v));
             return;
         }
         star.gather(stars, points, v);
@@ -95,7 +94,6 @@ Counts relocate(Move move, const StarsView& stars, double* points, const std::ui
         thread_local Relocation<D> work;
         work.stars = stars;
         work.points = points;
-        work.movable = movable;
         work.parameters = parameters;
         const std::int32_t block = blocks[item];
         for (std::int32_t i = block_offsets[block]; i < block_offsets[block + 1]; ++i)

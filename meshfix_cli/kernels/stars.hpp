@@ -51,6 +51,8 @@ void build_neighbours(Stars& stars, const std::int32_t* simplices, std::int64_t 
         }
         if (stars.neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
             throw std::length_error("a vertex has more than 65,535 neighbours");
+        if (stars.neighbours.size() > std::numeric_limits<std::int32_t>::max())
+            throw std::length_error("the mesh has more than a billion edges");
         stars.neighbour_offsets.push_back(static_cast<std::int32_t>(stars.neighbours.size()));
     }
 }

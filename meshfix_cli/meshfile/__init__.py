@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError, MeshfixError, ReadError, WriteError
-from meshfix_cli.mesh import CELL_NAMES, Mesh
+from meshfix_cli.mesh import CELL_NAMES, LARGEST_COORDINATE, Mesh, Topology
 from meshfix_cli.meshfile import formats, gmsh, obj, vtk
 from meshfix_cli.meshfile.atomic import check_target, write_file
 from meshfix_cli.meshfile.formats import Format
@@ -23,7 +23,6 @@ from meshfix_cli.meshfile.through_meshio import SIMPLEX, read_bytes, read_path, 
 
 __all__ = ["Document", "check_target", "output_format", "read", "write"]
 
-STDIN = "<stdin>"
 REGION_ARRAYS = ("gmsh:physical", "medit:ref", "cell_tags")
 SPLICED = {"gmsh": gmsh.find_coordinates, "obj": obj.find_coordinates, "vtk": vtk.find_coordinates}
 
@@ -67,7 +66,7 @@ class Document:
         if original.dtype.kind != "f":
             original = original.astype(np.float64)
         points: NDArray[np.floating[Any]] = original.copy()
-        moved = (mesh.points != self.mesh.points).any(axis=1)
+        moved = (mesh.points != self.mesh.points).any(axis=1) & mesh.topology.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
                 points[moved] = mesh.points[moved]
@@ -84,9 +83,19 @@ class Document:
     def in_plane(self, points: NDArray[np.float64], mesh: Mesh) -> Mesh:
         """Return a moved mesh at points (n, 2 or 3) in the coordinates of the file."""
         used = points[mesh.topology.used]
-        if not np.isfinite(used).all():
+        if not (np.abs(used) <= LARGEST_COORDINATE).all():
             raise InvalidMeshError("the coordinates are too large for the numbers of the file")
         return mesh.with_points(np.ascontiguousarray(points if self.basis is None else points @ self.basis.T))
+
+    def first_valid_as_stored(self, *meshes: Mesh) -> Mesh:
+        """Return the first of some moved meshes that is valid as the file stores it, else the best."""
+        ranked = []
+        for mesh in meshes:
+            inverted, smallest = self.as_stored(mesh).check()
+            if inverted == 0:
+                return mesh
+            ranked.append(((inverted, -smallest), mesh))
+        return min(ranked, key=lambda pair: pair[0])[1]
 
     def is_kept_by(self, form: Format) -> bool:
         """Whether writing in a format keeps all but the coordinates, byte for byte."""
@@ -112,14 +121,17 @@ def read(path: str | os.PathLike[str], fix: str | None = None, regions: str | No
     InvalidMeshError
         See `Mesh.build`.
     """
-    name = STDIN if os.fspath(path) == "-" else os.fspath(path)
+    streamed = os.fspath(path) == "-"
+    name = "<stdin>" if streamed else os.fspath(path)
     try:
-        data = _read_bytes(name)
+        data = _read_bytes(None if streamed else Path(name))
         form = formats.sniff(data[: formats.HEAD]) or formats.by_name(Path(name))
         if form is None:
             raise ReadError("the format is not recognised")
+        if form.name == "ply" and b"end_header" not in data:  # meshio would read for ever
+            raise ReadError("is truncated: its header does not end")
         # A pipe with a name can be read only once, as stdin can.
-        source = read_path(Path(name), form) if Path(name).is_file() else read_bytes(data, form)
+        source = read_bytes(data, form) if streamed or not Path(name).is_file() else read_path(Path(name), form)
         return _document(name, source, data, form, fix, regions)
     except MeshfixError as error:
         text = str(error)
@@ -213,9 +225,10 @@ def _splice(document: Document, points: NDArray[np.floating[Any]]) -> bytes | No
     return None if places is None else splice(document.data, places, document.source.points, points)
 
 
-def _read_bytes(name: str) -> bytes:
+def _read_bytes(path: Path | None) -> bytes:
+    """Read a file, or stdin."""
     try:
-        data = sys.stdin.buffer.read() if name == STDIN else Path(name).read_bytes()
+        data = sys.stdin.buffer.read() if path is None else path.read_bytes()
     except OSError as error:
         raise ReadError(error.strerror or str(error)) from error
     if not data:
@@ -239,7 +252,9 @@ def _document(name: str, source: Any, data: bytes, form: Format, fix: str | None
     reasons = {"on the boundary": topology.boundary}
     for key in _region_arrays(source, regions):
         labels = np.concatenate([source.cell_data[key][i] for i in chosen])
-        reasons[f"between regions of {key}"] = topology.interface(labels[topology.source])
+        if labels.ndim != 1:
+            raise ReadError(f"the cell data {key!r} are not labels of regions: they have {labels.shape[1]} components")
+        reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, simplices, topology))
     fixed = {}
     for reason, mask in {**reasons, **held}.items():
         counted = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
@@ -304,6 +319,19 @@ def _fixed_by(source: Any, name: str) -> NDArray[np.bool_]:
     return (values.reshape(len(values), -1) != 0).any(axis=1)
 
 
+def _region_codes(labels: NDArray[Any], simplices: NDArray[np.int64], topology: Topology) -> NDArray[np.int64]:
+    """A number for each simplex of the mesh that stands for its label, or for all labels of its repetitions."""
+    codes = np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    if len(topology.source) == len(simplices):
+        return codes
+    group = np.unique(np.sort(simplices, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    members: dict[int, set[int]] = {}
+    for which, code in zip(group.tolist(), codes.tolist(), strict=True):
+        members.setdefault(which, set()).add(code)
+    known: dict[frozenset[int], int] = {}
+    return np.array([known.setdefault(frozenset(members[g]), len(known)) for g in group[topology.source].tolist()])
+
+
 def _region_arrays(source: Any, name: str | None) -> list[str]:
     if name is None:
         return [key for key in REGION_ARRAYS if key in source.cell_data]
@@ -326,13 +354,8 @@ def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
     isolated = topology.n - int(topology.used.sum())
     if isolated:
         notes.append(f"{count(isolated, 'point belongs', 'points belong')} to no {one} and stay as they are")
-    components = int(topology.component.max()) + 1
-    mirrored = topology.mirrored_components
-    if mirrored == components > 0 and seen_from_above:
-        notes.append("all elements are numbered the other way round (mirrored); solved so, the numbering is kept")
-    elif 0 < mirrored < components:
-        which = count(mirrored, "component is", "components are")
-        notes.append(f"of {components:,} components {which} numbered the other way round; solved so")
+    if topology.mirrored and seen_from_above:
+        notes.append("the elements are numbered the other way round (mirrored); solved so, the numbering is kept")
     if not mesh.movable.any():
         notes.append("no vertex is free to move")
     return tuple(notes)

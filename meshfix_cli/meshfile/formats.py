@@ -67,6 +67,10 @@ def missing_part(path: Path, form: Format, cells: int) -> str | None:
             announced = int(data[start + 7 : start + 40].split()[0]) - (form.name == "vtk")
             if announced != cells:
                 return f"it announces {announced:,} cells and holds {cells:,}"
+        least = {"ply": rb"element face (\d+)", "su2": rb"NELEM\s*=\s*(\d+)"}.get(form.name)
+        found = re.search(least, data) if least else None
+        if found and cells < int(found[1]):
+            return f"it announces {int(found[1]):,} cells and holds {cells:,}"
     return None
 
 

@@ -335,6 +335,49 @@ def test_a_reader_that_goes_away_is_no_traceback() -> None:
     assert b"Exception ignored" not in done.stdout + done.stderr
 
 
+def on_terminal(*arguments: object, **environment: str) -> tuple[int, str]:
+    """Exit code of a run on a terminal, and all it shows there."""
+    pty = pytest.importorskip("pty")
+    master, slave = pty.openpty()
+    process = subprocess.Popen(
+        [MESHFIX, *map(str, arguments)], stdin=slave, stdout=slave, stderr=slave, close_fds=True,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "100", **environment},
+    )  # fmt: skip
+    os.close(slave)
+    shown = b""
+    while True:
+        try:
+            piece = os.read(master, 65536)
+        except OSError:  # the other end is closed
+            break
+        if not piece:
+            break
+        shown += piece
+    os.close(master)
+    return process.wait(), shown.decode()
+
+
+def test_progress_and_colour_are_for_terminals(tmp_path: Path) -> None:
+    arguments = ["untangle", SAMPLES / "bracket_tangled.vtk", tmp_path / "out.vtk"]
+    code, shown = on_terminal(*arguments)
+    assert code == 0
+    assert "\x1b[1;32mvalid: no element is inverted" in shown
+    assert "smoothing 3: 0 inverted" in shown
+    assert "32m" not in on_terminal(*arguments, NO_COLOR="1")[1]
+    assert b"\x1b" not in run(*arguments).stdout
+
+
+def test_terminals_get_no_binary_data_and_give_no_mesh(tmp_path: Path) -> None:
+    mesh = meshio.read(VALID)
+    mesh.write(tmp_path / "binary.vtk", binary=True)
+    code, shown = on_terminal("untangle", tmp_path / "binary.vtk")
+    assert code == 2
+    assert "binary data is not written to a terminal" in shown
+    code, shown = on_terminal("untangle")
+    assert code == 2
+    assert "there is no INPUT, and stdin is a terminal" in shown
+
+
 def test_help_of_every_command_names_every_option_and_strategy() -> None:
     for name, command in main.commands.items():
         text = CliRunner().invoke(main, [name, "--help"]).output

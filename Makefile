@@ -16,8 +16,12 @@ $(VENV)/installed: pyproject.toml $(KERNELS)
 	$(PIP) --editable . --config-settings=cmake.define.MESHFIX_WERROR=ON
 	touch $@
 
+# What the extras name, without building the package a second time.
+EXTRAS := from importlib.metadata import requires; \
+  print(*(r.split(";")[0] for r in requires("meshfix-cli") if "extra ==" in r and "meshfix" not in r))
+
 $(VENV)/developer: $(VENV)/installed
-	$(PIP) --editable '.[dev]' --config-settings=cmake.define.MESHFIX_WERROR=ON
+	$(PIP) $$($(BIN)/python -c '$(EXTRAS)')
 	touch $@
 
 demo: $(VENV)/installed ## install in .venv, tangle a 3-D sample and repair it

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import tangle
 from scipy.spatial.transform import Rotation
+from tables import CASES
 
 from meshfix_cli import perturb, untangle
 from meshfix_cli.mesh import Mesh
@@ -17,8 +18,6 @@ from meshfix_cli.perturb import Distance
 from meshfix_cli.quality import ceiling, evaluate, summarise
 from meshfix_cli.report import history_csv
 from meshfix_cli.untangle import SMOOTHING, STRATEGIES, SWEEPS, plan, steps
-
-CASES = [(5, 1), (10, 1), (25, 1), (50, 1), (25, 2), (25, 4), (25, 8)]  # the paper's tables
 
 
 @pytest.mark.parametrize("case", CASES)

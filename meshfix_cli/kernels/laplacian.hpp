@@ -5,7 +5,8 @@
 
 namespace meshfix {
 
-// To the geometric centre of the neighbours, only where that raises the smallest sine of the star. `quality`, in and out: min_sine2 at the position.
+// To the geometric centre of the neighbours, only where that raises the smallest sine of the star. `quality`, in and
+// out: min_sine2 at the position.
 template <int D>
 Vec<D> smart_laplacian(const Star<D>& star, double& quality) {
     const Vec<D> centre{};  // the origin of the local frame, which the global coordinates hold exactly

@@ -169,7 +169,7 @@ def write(document: Document, mesh: Mesh, target: str | os.PathLike[str], form: 
     check_target(target)
     points = document.file_points(mesh)
     spliced = _splice(document, points) if document.is_kept_by(form) else None
-    stored = document.as_stored(mesh)
+    stored = document.in_plane(points.astype(np.float64), mesh)
 
     def produce(temporary: Path) -> None:
         nonlocal stored

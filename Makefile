@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
-.PHONY: help demo test lint check sanitize bench tables samples clean
+.PHONY: help demo test lint check sanitize fuzz bench tables samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -47,10 +47,15 @@ sanitize: ## run the kernel tests with address and undefined-behaviour sanitiser
 	LD_PRELOAD="$$(gcc -print-file-name=libasan.so) $$(gcc -print-file-name=libubsan.so)" \
 	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	  $(VENV)-sanitize/bin/pytest -q -p no:cacheprovider -k "not highs and not every_case" \
-	  tests/test_kernels.py tests/test_linear_program.py tests/test_mesh.py tests/test_untangle.py
+	  tests/test_kernels.py tests/test_linear_program.py tests/test_mesh.py tests/test_text.py tests/test_untangle.py
 
-bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE for a mesh of yours
+EXAMPLES ?= 5000
+fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format
+	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/test_fuzz.py
+
+bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE for a mesh of yours; seconds to write files
 	$(BIN)/python benchmarks/kernels.py $(MESH)
+	$(BIN)/python benchmarks/files.py
 
 tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)

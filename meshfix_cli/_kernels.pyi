@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Int32 = NDArray[np.int32]
+Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
 
 class Stars:
@@ -64,3 +65,24 @@ def min_norm_point(vectors: Float64) -> Float64:
 
 def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[Float64, Float64, float]:
     """Sines of a star, their gradients, and sign * (smallest sine)^2 (-1 where the star is not valid)."""
+
+def find_words(data: bytes, offsets: Int64, count: int, one_line: bool) -> Int64:
+    """Spans (k * count, 2) of the first words at or behind each offset (k,).
+
+    With one_line, -1 for those that the line does not have; else fewer spans where the data end.
+    """
+
+def scan_integers(data: bytes, at: int, count: int) -> tuple[Int64, int, int]:
+    """Values, the offset behind them, and the offset of what is not an integer or -1."""
+
+def integers(data: bytes, spans: Int64) -> tuple[Int64, int]:
+    """Values of the words at spans (n, 2), up to a slash, and the row of the first that is not an integer or -1."""
+
+def numbers(data: bytes, spans: Int64, single: bool) -> tuple[Float64, int]:
+    """Values of the words at spans (n, 2), and the row of the first that is not a number or -1; single: of float32."""
+
+def shortest(values: Float64, single: bool, longest: int) -> tuple[bytes, Int64]:
+    """The shortest texts that read back to the values, joined, and their spans; longest: characters at most, or 0."""
+
+def replace(data: bytes, spans: Int64, words: bytes, word_spans: Int64) -> bytes:
+    """The data with each span (k, 2), in their order, replaced by a span of `words`."""

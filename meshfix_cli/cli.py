@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -21,9 +22,12 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh import Mesh
     from meshfix_cli.meshfile import Document
     from meshfix_cli.meshfile.formats import Format
+    from meshfix_cli.quality import Requirement
     from meshfix_cli.report import Report
+    from meshfix_cli.untangle import Outcome
 
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
+NAMED = 10  # losses that a note names one by one
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]
@@ -56,10 +60,25 @@ class _Distance(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"{value!r} is neither a length such as 0.3 nor in mean edge lengths such as 2h", param, ctx)
 
 
+class _Requirement(click.ParamType):  # type: ignore[type-arg]
+    name = "CONDITION"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        from meshfix_cli.quality import Requirement
+
+        try:
+            return value if isinstance(value, Requirement) else Requirement.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
 class _Group(click.Group):
-    """Errors are one line on stderr and an exit code, never a traceback."""
+    """Errors are one line on stderr and an exit code, never a traceback; signals leave no temporary file."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) != signal.SIG_IGN:  # as nohup does
+                signal.signal(getattr(signal, name), _stop)
         for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
             if getattr(sys, name) is None:  # closed by the shell: >&-
                 setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 (for the whole run)
@@ -74,6 +93,13 @@ class _Group(click.Group):
             sys.exit(ERROR)
         except OSError as error:
             _fail(str(error))
+
+
+def _stop(number: int, frame: object) -> NoReturn:
+    """Leave through every `finally`; a second signal must not disturb the clearing up."""
+    del frame
+    signal.signal(number, signal.SIG_IGN)
+    sys.exit(128 + number)
 
 
 def _complain(message: str) -> None:
@@ -111,12 +137,12 @@ class _Held:
     fix: str | None
     regions: str | None
 
-    def read(self, source: str) -> Document:
+    def read(self, source: str, *, double: bool = False, fix_orientation: bool = False) -> Document:
         from meshfix_cli.meshfile import read
 
         if source == "-" and sys.stdin.isatty():
             raise click.UsageError("there is no INPUT, and stdin is a terminal")
-        return read(source, self.fix, self.regions)
+        return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation)
 
 
 @dataclass(frozen=True)
@@ -126,20 +152,20 @@ class _Files:
     source: str
     target: str
     form: str | None
+    double: bool
+    fix_orientation: bool
+    backup: bool
     dry_run: bool
 
     def open(self, held: _Held, *others: str | None) -> tuple[Document, Format]:
         """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
         from meshfix_cli.meshfile import check_target, output_format
 
-        meshes = [Path(name).resolve() for name in (self.source, self.target) if name != "-"]
         for other in filter(None, others):
-            if Path(other).resolve() in meshes:
-                raise click.UsageError(f"{other} is the name of a mesh")
-            check_target(other)
+            _check_other(other, self.source, self.target)
         if not self.dry_run:
             check_target(self.target)
-        document = held.read(self.source)
+        document = held.read(self.source, double=self.double, fix_orientation=self.fix_orientation)
         output = output_format(document, self.target, self.form)
         if output.binary and self.target == "-" and sys.stdout.isatty() and not self.dry_run:
             raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
@@ -151,10 +177,14 @@ class _Files:
 
         if self.dry_run:
             return document.as_stored(mesh), ()
-        stored = write(document, mesh, self.target, output)
+        stored, dropped = write(document, mesh, self.target, output, self.backup)
         if document.is_kept_by(output):
             return stored, ()
-        return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
+        if document.source.layout is None:
+            return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
+        more = f" and {len(dropped) - NAMED} more" if len(dropped) > NAMED else ""
+        lost = f"; dropped: {', '.join(dropped[:NAMED])}{more}" if dropped else ""
+        return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
 
     @property
     def report_stream(self) -> Any:
@@ -172,22 +202,30 @@ class _Show:
     threads: int
 
     def report(
-        self, command: str, document: Document, stages: Mapping[str, Mesh], notes: tuple[str, ...] = (), **more: Any
+        self,
+        command: str,
+        document: Document,
+        stages: Mapping[str, Mesh],
+        notes: tuple[str, ...] = (),
+        requirements: tuple[Requirement, ...] = (),
+        **more: Any,
     ) -> Report:
         from meshfix_cli.quality import ceiling, summarise
         from meshfix_cli.report import Report
 
         result = list(stages.values())[-1]
+        metrics = tuple(dict.fromkeys((*self.metrics, *(one.name for one in requirements if one.is_metric))))
         return Report(
             name=document.name,
             command=command,
             mesh=result,
             points=document.file_points(result),
             ids=document.ids,
-            stages={stage: summarise(mesh, self.metrics, self.threads) for stage, mesh in stages.items()},
+            stages={stage: summarise(mesh, metrics, self.threads) for stage, mesh in stages.items()},
             ceiling=ceiling(result, self.threads),
             fixed=document.fixed,
             notes=(*document.notes, *notes),
+            requirements=requirements,
             **more,
         )
 
@@ -236,8 +274,12 @@ _writing = _packed(
     click.argument("source", metavar="[INPUT]", default="-"),
     click.argument("target", metavar="[OUTPUT]", default="-"),
     click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
+    click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
+    click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
+    click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
     click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
 )
+_cells = click.option("--cells", metavar="FILE", help="Write a mesh with the quality of each element, for ParaView.")
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
@@ -262,6 +304,7 @@ def main() -> None:
     help=f"Optimise stars with smaller angles. [default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
 )
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
+@_cells
 @click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
 @_holding
 @_reporting
@@ -274,6 +317,7 @@ def untangle(
     smooth: int,
     threshold: float | None,
     history: str | None,
+    cells: str | None,
     allow_inverted: bool,
 ) -> None:
     """Move interior vertices until no element is inverted, then improve the worst angles.
@@ -284,19 +328,33 @@ def untangle(
     from meshfix_cli.report import console, history_csv, with_progress
     from meshfix_cli.untangle import collect, plan, steps
 
-    document, output = files.open(held, history)
+    document, output = files.open(held, history, cells)
     run = steps(document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, threads=show.threads)
     outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)))
     after = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
     result, notes = files.write(document, after, output)
-    if after is not outcome.after:
-        notes += ("smoothed positions, rounded as the file stores them, invert elements: written as before",)
+    notes = (*_what_happened(document, outcome, after, result), *notes)
     if history is not None:
         _write_text(history, history_csv(outcome.records))
+    if cells is not None:
+        _write_cells(document, result, cells, show.threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
     report = show.report("untangle", document, stages, notes, records=outcome.records, facts={"strategy": strategy})
     show.print(report, files.report_stream)
     sys.exit(VALID if report.valid or allow_inverted else INVERTED)
+
+
+def _what_happened(document: Document, outcome: Outcome, after: Mesh, result: Mesh) -> tuple[str, ...]:
+    """Say that nothing was to be done, or that the file's numbers are too coarse for the result."""
+    if len(outcome.records) == 1 and outcome.valid:
+        return ("no element is inverted and no angle is below what --threshold asks for: nothing was moved",)
+    inverted = document.as_stored(outcome.after).check()[0] if outcome.records[-1].inverted == 0 else 0
+    if not inverted:
+        return ()
+    kind = document.source.points.dtype.name
+    way_out = "; --double stores them as they are" if kind == "float32" else ""
+    written = "" if after is outcome.after else ", so the mesh before that is written"
+    return (f"positions rounded to the file's {kind} invert {inverted:,} elements{written}{way_out}",)
 
 
 @main.command()
@@ -325,22 +383,68 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
 
 @main.command()
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
+@_cells
+@click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
+@click.option(
+    "--require",
+    "requirements",
+    type=_Requirement(),
+    multiple=True,
+    metavar="CONDITION",
+    help="Exit with 3 where it is not met, such as 'min_angle >= 5'; may be given more than once.",
+)
 @_holding
 @_reporting
-def quality(sources: tuple[str, ...], held: _Held, show: _Show) -> None:
-    """Report the quality of meshes; writes nothing. One that cannot be read does not stop the others."""
+def quality(
+    sources: tuple[str, ...],
+    cells: str | None,
+    everything: bool,
+    requirements: tuple[Requirement, ...],
+    held: _Held,
+    show: _Show,
+) -> None:
+    """Report the quality of meshes, and where elements are inverted. One unreadable mesh does not stop the others.
+
+    A CONDITION compares a number of the JSON report (inverted, folded, min_measure, min_angle, max_angle,
+    mean_min_angle, percentile_1), or the worst value of a --metric, by >=, <=, >, < or ==.
+    """
+    if cells is not None and len(sources) > 1:
+        raise click.UsageError("--cells takes one INPUT")
     codes = set()
     for source in sources:
         try:
             document = held.read(source)
+            if cells is not None:
+                _check_other(cells, source)
+                _write_cells(document, document.mesh, cells, show.threads)
         except MeshfixError as error:
             _complain(str(error))
             codes.add(ERROR)
             continue
-        report = show.report("quality", document, {"mesh": document.mesh})
+        report = show.report(
+            "quality", document, {"mesh": document.mesh}, requirements=requirements, everything=everything
+        )
         show.print(report, sys.stdout)
-        codes.add(VALID if report.valid else INVERTED)
+        codes.add(VALID if report.valid and report.met else INVERTED)
     sys.exit(max(codes) if ERROR not in codes else SOME_FAILED if len(sources) > 1 else ERROR)
+
+
+def _check_other(name: str, *meshes: str) -> None:
+    """A file beside the mesh must not replace one, and can be written."""
+    from meshfix_cli.meshfile import check_target
+
+    if Path(name).resolve() in [Path(mesh).resolve() for mesh in meshes if mesh != "-"]:
+        raise click.UsageError(f"{name} is the name of a mesh")
+    check_target(name)
+
+
+def _write_cells(document: Document, mesh: Mesh, target: str, threads: int) -> None:
+    from meshfix_cli.meshfile import write_cells
+    from meshfix_cli.quality import by_element, distances
+
+    cell = {**by_element(mesh, threads), "element": document.ids}
+    point = {} if mesh is document.mesh else {"distance_moved": distances(document.mesh, mesh)}
+    write_cells(document, mesh, target, cell, point)
 
 
 def _write_text(target: str, text: str) -> None:

@@ -78,14 +78,14 @@ class Topology:
         """(n,) bool: vertices of facets that belong to one simplex."""
         return self._mark_facets(self.mates < 0)
 
-    @property
-    def mirrored(self) -> bool:
-        """The user's numbering has, for most simplices, the other orientation."""
-        return bool(self.flipped.mean() > 0.5)
-
     @cached_property
+    def mirrored(self) -> NDArray[np.bool_]:
+        """(m,) bool: simplices of components whose numbering has, for most, the other orientation."""
+        return (np.bincount(self.component, weights=self.flipped * 2.0 - 1.0) > 0)[self.component]
+
+    @property
     def misnumbered(self) -> NDArray[np.bool_]:
-        """(m,) bool: simplices numbered against most of the mesh: inverted for whoever reads the file."""
+        """(m,) bool: simplices numbered against most of their component: inverted for whoever reads the file."""
         return self.flipped != self.mirrored
 
     def interface(self, regions: ArrayLike) -> NDArray[np.bool_]:

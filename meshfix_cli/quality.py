@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import operator
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import combinations
 from typing import Literal
 
@@ -18,6 +20,11 @@ Array = NDArray[np.float64]
 BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
 # The smallest angle of a triangle is at most 60 degrees, of a tetrahedron at most acos(1/3) = 70.5.
 BINS = {2: 12, 3: 15}
+
+
+RELATIONS: dict[str, Callable[[float, float], bool]] = {
+    ">=": operator.ge, "<=": operator.le, "==": operator.eq, ">": operator.gt, "<": operator.lt,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -56,6 +63,10 @@ class Summary:
     inverted_elements: NDArray[np.int64]
 
 
+# What a requirement can name beside the metrics: what the report prints of a mesh.
+NUMBERS = tuple(field.name for field in fields(Summary) if field.type in ("int", "float"))
+
+
 def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summary:
     """Evaluate a mesh.
 
@@ -92,6 +103,73 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summ
         metrics={name: _worst_and_mean(name, mesh) for name in metrics},
         inverted_elements=inverted_elements,
     )
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A condition on the summary of a mesh, such as `min_angle >= 5`.
+
+    Attributes
+    ----------
+    name : str
+        A number of `Summary`, or a key of `METRICS`, of which the worst value counts.
+    relation : str
+        A key of `RELATIONS`.
+    bound : float
+    """
+
+    name: str
+    relation: str
+    bound: float
+
+    @classmethod
+    def parse(cls, text: str) -> Requirement:
+        """Read `NAME RELATION NUMBER`; ValueError, in one sentence, for anything else."""
+        match = re.fullmatch(r"\s*(\w+)\s*(>=|<=|==|>|<)\s*(\S+)\s*", text)
+        if match is None:
+            raise ValueError(f"{text!r} is not a condition such as 'min_angle >= 5'")
+        name, relation, bound = match.groups()
+        if name not in NUMBERS and name not in METRICS:
+            raise ValueError(f"{name!r} is none of {', '.join(dict.fromkeys((*NUMBERS, *METRICS)))}")
+        try:
+            number = float(bound)
+        except ValueError:
+            number = float("nan")
+        if number != number:
+            raise ValueError(f"{bound!r} is not a number")
+        return cls(name, relation, number)
+
+    @property
+    def is_metric(self) -> bool:
+        """Whether it is a metric that `summarise` must be asked for."""
+        return self.name not in NUMBERS
+
+    def value(self, summary: Summary) -> float:
+        """Return the number that is compared."""
+        return float(summary.metrics[self.name][0] if self.is_metric else getattr(summary, self.name))
+
+    def holds(self, summary: Summary) -> bool:
+        """Whether a mesh meets it."""
+        return bool(RELATIONS[self.relation](self.value(summary), self.bound))
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.relation} {self.bound:g}"
+
+
+def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
+    """Return arrays (m,): the signed measure in model units, the smallest angle in degrees, 1 where inverted."""
+    measure, valid = _kernels.measure(mesh.points, mesh.topology.simplices, threads)
+    smallest, _ = _kernels.angles(mesh.points, mesh.topology.simplices, threads)
+    wrong = (valid == 0) | mesh.topology.misnumbered
+    return {"measure": measure, "min_angle": np.degrees(smallest), "inverted": wrong.astype(np.int32)}
+
+
+def distances(before: Mesh, after: Mesh) -> Array:
+    """Return how far each vertex moved (n,), in model units; 0 for points that belong to no element."""
+    used = before.topology.used
+    moved = np.zeros(len(used))
+    moved[used] = np.linalg.norm(after.points[used] - before.points[used], axis=1)
+    return moved
 
 
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:

@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 from meshfix_cli.mesh import CELL_NAMES, Mesh
-from meshfix_cli.quality import BIN_WIDTH, Summary
+from meshfix_cli.quality import BIN_WIDTH, Requirement, Summary
 
 if TYPE_CHECKING:
     from meshfix_cli.untangle import SweepRecord
@@ -48,6 +48,10 @@ class Report:
     notes : sequence of str
     facts : dict
         Whatever else the command has to tell, under stable names.
+    requirements : sequence of Requirement
+        What the user asks of the result.
+    everything : bool
+        List all inverted elements, not only the first.
     """
 
     name: str
@@ -61,6 +65,8 @@ class Report:
     records: Sequence[SweepRecord] = ()
     notes: Sequence[str] = ()
     facts: Mapping[str, Any] | None = None
+    requirements: Sequence[Requirement] = ()
+    everything: bool = False
 
     @property
     def result(self) -> Summary:
@@ -82,6 +88,16 @@ class Report:
     def valid(self) -> bool:
         """No element is inverted, by shape or by numbering."""
         return self.result.inverted == 0 and self.misnumbered == 0
+
+    @property
+    def met(self) -> bool:
+        """All requirements are."""
+        return all(one.holds(self.result) for one in self.requirements)
+
+    @property
+    def listed(self) -> int | None:
+        """How many elements are listed; None: all."""
+        return None if self.everything else LISTED
 
 
 def console(stream: Any) -> Console:
@@ -105,6 +121,11 @@ def print_report(report: Report, out: Console) -> None:
         line(f"note: {note}")
     for text in _verdict(report):
         line(text, "bold green" if report.valid else "bold red")
+    for one in report.requirements:
+        met = one.holds(report.result)
+        line(
+            f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g})", "green" if met else "bold red"
+        )
 
 
 def print_json(report: Report, out: Console) -> None:
@@ -132,6 +153,10 @@ def to_json(report: Report) -> dict[str, Any]:
         "inverted_without_free_vertex": report.stuck,
         "sweeps": [asdict(record) for record in report.records],
         "notes": list(report.notes),
+        "requirements": [
+            {"requirement": str(one), "value": _finite(one.value(report.result)), "met": one.holds(report.result)}
+            for one in report.requirements
+        ],
         **(report.facts or {}),
     }
 
@@ -235,16 +260,16 @@ def _verdict(report: Report) -> list[str]:
     if count:
         verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
         text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
-        lines.append(text + (f"; the first {LISTED}:" if count > LISTED else ":"))
+        lines.append(text + (f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"))
         lines += [f"  cell {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
         if report.stuck:
             lines.append(f"{report.stuck:,} of them without a free vertex: the fixed ones are wrong")
     if report.misnumbered:
-        first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[:LISTED]].tolist()
-        some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > LISTED else "")
+        first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[: report.listed]].tolist()
+        some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > len(first) else "")
         what = "element is" if report.misnumbered == 1 else "elements are"
         text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (cell {some})"
-        lines.append(f"{text}; meshfix keeps the numbering")
+        lines.append(f"{text}; untangle --fix-orientation renumbers them")
     return lines
 
 
@@ -253,6 +278,6 @@ def _perturbed(facts: Mapping[str, Any]) -> str:
 
 
 def _listed(report: Report) -> list[tuple[int, list[float]]]:
-    first = report.result.inverted_elements[:LISTED]
+    first = report.result.inverted_elements[: report.listed]
     centroids = report.points[report.mesh.topology.simplices[first]].mean(axis=1)
     return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]

@@ -142,6 +142,8 @@ def steps(
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
     """Run the phases; yield the mesh and a record as it came and after each sweep.
 
+    A valid mesh without an angle below the threshold, but for simplices without a free vertex, is left alone.
+
     A phase that starts from the best mesh where that is not the last one begins with a record of phase "best";
     smoothing does, so the result is never worse than the input.
 
@@ -163,6 +165,8 @@ def steps(
     record = SweepRecord("input", 0, *mesh.check(threads), moved=0, seconds=time.perf_counter() - start)
     best = mesh, record
     yield mesh, record
+    if record.inverted == 0 and _meets_target(mesh, degrees, threads):
+        return
     for phase in phases:
         if phase.from_best and best[1].rank < record.rank:
             mesh, record = best[0], replace(best[1], phase="best", moved=0, seconds=0.0)
@@ -179,6 +183,12 @@ def steps(
             yield mesh, record
             if record.moved == 0 or (phase.until == "stalled" and waited == PATIENCE):
                 break
+
+
+def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
+    """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
+    free = mesh.topology.simplices[mesh.movable[mesh.topology.simplices].any(axis=1)]
+    return bool(_kernels.angles(mesh.points, free, threads)[0].min(initial=math.pi) >= math.radians(degrees))
 
 
 def _sweep(mesh: Mesh, phase: Phase, number: int, threshold_sine2: float, threads: int) -> tuple[Mesh, SweepRecord]:

@@ -20,7 +20,7 @@ ALLOWED = {
     "quality": {"_kernels", "mesh"},
     "untangle": {"_kernels", "mesh"},
     "perturb": {"mesh"},
-    "meshfile": {"errors", "mesh"},
+    "meshfile": {"_kernels", "errors", "mesh"},
     "report": {"mesh", "quality", "untangle"},
     "cli": {"errors", "mesh", "meshfile", "perturb", "quality", "report", "untangle", "__init__"},
     "__init__": {"mesh", "meshfile", "perturb", "quality", "untangle"},

@@ -68,8 +68,18 @@ def test_the_limit_is_that_of_all_untangling_sweeps(bracket: Mesh, strategy: str
 
 def test_valid_mesh_goes_straight_to_smoothing(mesh: Mesh) -> None:
     for strategy in STRATEGIES:
-        assert {r.phase for r in untangle(mesh, strategy).records} == {"input", SMOOTHING}
+        assert {r.phase for r in untangle(mesh, strategy, threshold=80).records} == {"input", SMOOTHING}
     assert untangle(mesh, smooth=0).after is mesh
+
+
+def test_a_mesh_that_meets_the_target_is_left_alone(mesh: Mesh) -> None:
+    free = mesh.movable[mesh.topology.simplices].any(axis=1)
+    smallest = evaluate("min_angle", mesh)[free].min()
+    assert summarise(mesh).min_angle <= smallest  # others may be worse: nothing can be done about them
+    assert untangle(mesh, threshold=0.999 * smallest).after is mesh
+    assert untangle(mesh, threshold=1.001 * smallest).after is not mesh
+    held = mesh.with_fixed(mesh.movable)
+    assert untangle(held, threshold=80).after is held
 
 
 def test_smoothing_never_lowers_the_worst_quality_of_the_mesh(mesh: Mesh) -> None:

@@ -8,6 +8,7 @@
 #include "measures.hpp"
 #include "relocate.hpp"
 #include "stars.hpp"
+#include "text.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -212,6 +213,96 @@ auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::ui
     return std::make_tuple(to_numpy(std::move(values)), to_numpy(std::move(gradients), d), smallest);
 }
 
+std::string_view view_of(const nb::bytes& data) { return {data.c_str(), data.size()}; }
+
+std::string_view word_at(std::string_view text, const std::int64_t* span) {
+    const auto size = static_cast<std::int64_t>(text.size());
+    if (span[0] < 0 || span[1] < span[0] || span[1] > size) return {};
+    return text.substr(static_cast<std::size_t>(span[0]), static_cast<std::size_t>(span[1] - span[0]));
+}
+
+auto find_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t count,
+                   bool one_line) {
+    const std::string_view text = view_of(data);
+    std::vector<std::int64_t> spans;
+    for (std::size_t i = 0; i < offsets.shape(0); ++i) {
+        Span word{offsets(i), offsets(i)};
+        for (std::int64_t j = 0; j < count; ++j) {
+            if (word.end >= 0) word = next_word(text, word.end, one_line);
+            if (word.end < 0 && !one_line) return to_numpy(std::move(spans), 2);
+            spans.insert(spans.end(), {word.begin, word.end});
+        }
+    }
+    return to_numpy(std::move(spans), 2);
+}
+
+auto scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    const std::string_view text = view_of(data);
+    std::vector<std::int64_t> values;
+    std::int64_t bad = -1;
+    for (std::int64_t value = 0; static_cast<std::int64_t>(values.size()) < count; values.push_back(value)) {
+        const Span word = next_word(text, at, false);
+        const std::int64_t span[2] = {word.begin, word.end};
+        if (word.begin < 0 || !read_integer(word_at(text, span), value)) {
+            bad = word.begin < 0 ? static_cast<std::int64_t>(text.size()) : word.begin;
+            break;
+        }
+        at = word.end;
+    }
+    return std::make_tuple(to_numpy(std::move(values)), at, bad);
+}
+
+template <class Real, class Value, class Read>
+auto read_words(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const Read& read) {
+    const std::string_view text = view_of(data);
+    std::vector<Value> values(spans.shape(0));
+    std::int64_t bad = -1;
+    for (std::size_t i = 0; i < values.size() && bad < 0; ++i) {
+        Real value{};
+        if (!read(word_at(text, spans.data() + 2 * i), value)) bad = static_cast<std::int64_t>(i);
+        values[i] = static_cast<Value>(value);
+    }
+    return std::make_pair(to_numpy(std::move(values)), bad);
+}
+
+auto integers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans) {
+    return read_words<std::int64_t, std::int64_t>(data, spans, read_integer);
+}
+
+auto numbers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, bool single) {
+    return single ? read_words<float, double>(data, spans, read_number<float>)
+                  : read_words<double, double>(data, spans, read_number<double>);
+}
+
+auto shortest_py(const Vector<const double>& values, bool single, int longest) {
+    std::string words;
+    std::vector<std::int64_t> spans;
+    for (std::size_t i = 0; i < values.shape(0); ++i) {
+        spans.push_back(static_cast<std::int64_t>(words.size()));
+        words += single ? shortest(static_cast<float>(values(i)), longest) : shortest(values(i), longest);
+        spans.push_back(static_cast<std::int64_t>(words.size()));
+    }
+    return std::make_pair(nb::bytes(words.data(), words.size()), to_numpy(std::move(spans), 2));
+}
+
+nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const nb::bytes& words,
+                     const Matrix<const std::int64_t>& word_spans) {
+    const std::string_view text = view_of(data), replacements = view_of(words);
+    std::string out;
+    out.reserve(text.size() + replacements.size());
+    std::int64_t done = 0;
+    for (std::size_t i = 0; i < spans.shape(0); ++i) {
+        const std::int64_t* span = spans.data() + 2 * i;
+        const std::int64_t before[2] = {done, span[0]};
+        if (span[0] < done) throw nb::value_error("the spans overlap or are not in order");
+        out += word_at(text, before);
+        out += word_at(replacements, word_spans.data() + 2 * i);
+        done = span[1];
+    }
+    out += text.substr(static_cast<std::size_t>(done));
+    return nb::bytes(out.data(), out.size());
+}
+
 }  // namespace
 
 NB_MODULE(_kernels, m) {
@@ -225,6 +316,12 @@ NB_MODULE(_kernels, m) {
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert());
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
+    m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
+    m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert());
+    m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
+    m.def("shortest", &shortest_py, "values"_a.noconvert(), "single"_a, "longest"_a);
+    m.def("replace", &replace_py, "data"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());
 
     nb::class_<PyStars>(m, "Stars")
         .def("__init__", &init_stars, "simplices"_a.noconvert(), "n"_a)

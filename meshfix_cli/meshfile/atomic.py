@@ -7,6 +7,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 from meshfix_cli.errors import WriteError
@@ -27,11 +28,11 @@ def check_target(target: str) -> None:
         raise WriteError(f"{target}: the directory is not writable")
 
 
-def write_file(target: str, produce: Callable[[Path], None]) -> None:
+def write_file(target: str, produce: Callable[[Path], object], backup: bool = False) -> None:
     """Let `produce` write a temporary file, then put it in the place of `target` at once ("-": stdout).
 
     The temporary file is in a folder of its own beside the target, so the replacement is one rename; symbolic
-    links are followed and the mode of an existing file is kept.
+    links are followed and the mode of an existing file is kept. With `backup` that file stays as `target.bak`.
     """
     streamed = target == "-" or _is_special(Path(target))
     path = Path(target) if streamed else Path(target).resolve()
@@ -45,18 +46,36 @@ def write_file(target: str, produce: Callable[[Path], None]) -> None:
             elif streamed:
                 path.write_bytes(temporary.read_bytes())
             else:
-                _replace(temporary, path)
+                _replace(temporary, path, backup)
     except BrokenPipeError:  # nobody reads stdout any more: the command line knows what that means
         raise
     except OSError as error:
         raise WriteError(f"{target}: {error.strerror or error}") from error
 
 
-def _replace(temporary: Path, path: Path) -> None:
+def _replace(temporary: Path, path: Path, backup: bool) -> None:
     temporary.chmod(stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask())
     with temporary.open("rb") as written:
         os.fsync(written.fileno())
+    if backup and path.exists():
+        _keep(path)
     temporary.replace(path)
+    if os.name == "posix":  # the rename itself is on the disk only when its folder is
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _keep(path: Path) -> None:
+    """Give a file a second name that no other file has; the rename takes the first one away."""
+    for number in count():
+        try:
+            path.with_name(f"{path.name}.bak{number or ''}").hardlink_to(path)
+        except FileExistsError:
+            continue
+        return
 
 
 def _umask() -> int:

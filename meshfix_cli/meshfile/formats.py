@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-import mmap
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 HEAD = 4096  # bytes that are enough to recognise a format
+
+# Formats that a module of this package, of the same name, reads and writes back: meshio's names of the readers.
+OWN = ("abaqus", "gmsh", "medit", "obj", "ply", "stl", "vtk", "vtu")
+# Extensions that need not be looked up. `.msh` is gmsh's, whatever meshio's default is; a file that becomes one is of
+# version 2.2, in which each element has its group: meshio's writer of 4.1 has one for each run of them.
+_EXTENSIONS = {f".{name}": name for name in ("obj", "ply", "stl", "vtk", "vtu")} | {
+    ".inp": "abaqus",
+    ".mesh": "medit",
+    ".msh": "gmsh22",
+}
+BOTH = ("gmsh", "gmsh22", "ply", "stl", "vtk", "vtk42", "vtu")  # written as text or binary
 
 
 @dataclass(frozen=True)
@@ -23,8 +33,11 @@ class Format:
         return {"gmsh22": "gmsh", "vtk42": "vtk"}.get(self.name, self.name)
 
 
-def sniff(head: bytes) -> Format | None:
+def sniff(data: bytes) -> Format | None:
     """Recognise a format by the first bytes of a file; None: unknown."""
+    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return Format("stl", True)
+    head = data[:HEAD]
     text = head.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf \t\r\n")
     if text.startswith("# vtk DataFile"):
         version = re.match(r"# vtk DataFile Version (\d+)", text)
@@ -42,46 +55,42 @@ def sniff(head: bytes) -> Format | None:
         return Format("ply", "format ascii" not in text)
     if text.startswith("solid") and "facet" in text:
         return Format("stl", False)
-    for start, name in (("MeshVersionFormatted", "medit"), ("OFF", "off"), ("NDIME", "su2")):
+    if re.match(r"(#.*\s+)*MeshVersionFormatted\b", text):
+        return Format("medit")
+    for start, name in (("OFF", "off"), ("NDIME", "su2")):
         if text.startswith(start):
             return Format(name)
-    if re.match(r"\*(heading|node|part|\*)", text, re.IGNORECASE):
+    if re.match(r"\*(\*| *[A-Za-z]{3})", text):
         return Format("abaqus")
     if re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE) and re.match(r"(#|o |g |v |mtllib )", text):
         return Format("obj")
     return None
 
 
-def missing_part(path: Path, form: Format, cells: int) -> str | None:
+def missing_part(data: bytes, form: Format, cells: int) -> str | None:
     """Say what a file announces but does not hold; meshio reads some truncated files without a word.
 
     `cells` is the number of cells that were read.
     """
-    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
-        if form.reader == "gmsh":
-            for section in (b"Nodes", b"Elements"):
-                if data.find(b"$" + section) >= 0 > data.find(b"$End" + section):
-                    return f"the section ${section.decode()} does not end"
-        start = data.find(b"\nCELLS ") if form.reader == "vtk" else -1
-        if start >= 0:
-            announced = int(data[start + 7 : start + 40].split()[0]) - (form.name == "vtk")
-            if announced != cells:
-                return f"it announces {announced:,} cells and holds {cells:,}"
-        least = {"ply": rb"element face (\d+)", "su2": rb"NELEM\s*=\s*(\d+)"}.get(form.name)
-        found = re.search(least, data) if least else None
-        if found and cells < int(found[1]):
-            return f"it announces {int(found[1]):,} cells and holds {cells:,}"
+    if form.reader == "gmsh":
+        for section in (b"Nodes", b"Elements"):
+            if data.find(b"$" + section) >= 0 > data.find(b"$End" + section):
+                return f"the section ${section.decode()} does not end"
+    found = re.search(rb"NELEM\s*=\s*(\d+)", data) if form.name == "su2" else None
+    if found and cells < int(found[1]):
+        return f"it announces {int(found[1]):,} cells and holds {cells:,}"
     return None
 
 
 def by_name(path: Path) -> Format | None:
-    """Recognise a format by the extension; None: unknown. `.msh` is gmsh's, whatever meshio's default is."""
+    """Recognise a format by the extension; None: unknown."""
+    suffix = path.suffix.lower()
+    if suffix in _EXTENSIONS:
+        return Format(_EXTENSIONS[suffix])
     import meshio
 
-    names = meshio.extension_to_filetypes.get(path.suffix.lower(), [])
-    if not names:
-        return None
-    return Format("gmsh" if "gmsh" in names else names[0])
+    names = meshio.extension_to_filetypes.get(suffix, [])
+    return Format(names[0]) if names else None
 
 
 def writers() -> tuple[str, ...]:

@@ -1,92 +1,137 @@
-"""Coordinates in gmsh's .msh files, versions 2 and 4.1, ASCII and binary.
+"""Files of gmsh, .msh: versions 2.0 to 2.2 and 4.1, in text and binary.
 
-Source: the chapter "MSH file format" of gmsh's reference manual.
+Source: "Gmsh Reference Manual", chapter "Gmsh file formats", and there "Legacy formats".
 """
 
 from __future__ import annotations
 
-import re
-import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from meshfix_cli.meshfile.splice import Places, Span, binary_places, text_places
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.gmsh_cells import ORDER, TYPES
+from meshfix_cli.meshfile.gmsh_numbers import Int64
+from meshfix_cli.meshfile.gmsh_sections import Block, File, Numbers, UnknownError, read
+from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.splice import InPlace, Places
 
-_LINE = re.compile(rb"[^\n]*\n")
-_XYZ = re.compile(rb"[ \t]*(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n")
-_TAG_XYZ = re.compile(rb"[ \t]*\S+[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)[^\n]*\n")
+_PHYSICAL, _SETS, _ENTITY = "gmsh:physical", "gmsh:physical_set", "gmsh:geometrical"
 
 
-def find_coordinates(data: bytes) -> Places | None:
-    """Find the nodes in their order in the file; None: not in the form this module knows."""
-    header = re.search(rb"\$MeshFormat\s+(\S+)\s+([01])\s+8[^\n]*\n(.{4})?", data, re.DOTALL)
-    section = data.find(b"\n$Nodes")
-    if header is None or section < 0:
+def parse(data: bytes) -> Source | None:
+    """Read nodes and elements; None: another version, or elements such as polygons."""
+    try:
+        file = read(data)
+    except UnknownError:
         return None
-    start = data.index(b"\n", section + 1) + 1
-    order = "<" if header[3] == struct.pack("<i", 1) else ">"
-    reader = {
-        (b"2", b"0"): _text_2, (b"2", b"1"): _binary_2, (b"4.1", b"0"): _text_4, (b"4.1", b"1"): _binary_4,
-    }.get((header[1].split(b".")[0] if header[1].startswith(b"2") else header[1], header[2]))  # fmt: skip
-    return reader(data, start, order) if reader else None
+    for name, found in (("Nodes", file.tags), ("Elements", file.blocks)):
+        if not found:
+            raise ReadError(f"is not a readable gmsh file: there are no ${name} in it")
+    tags, coordinates = np.concatenate(file.tags), _joined(file.coordinates)
+    find = _finder(tags)
+    cells = [Cells(TYPES[block.kind][0], _vertices(block, find), block.ids) for block in file.blocks]
+    labels = _labels(file)
+    layout = InPlace(data, coordinates, [block.corners for block in file.blocks])
+    load = partial(_load, file, tags, cells, labels)
+    return Source(coordinates.read(data), cells, layout, load, _regions(cells, labels), untold=tuple(file.untold))
 
 
-def _text_2(data: bytes, at: int, order: str) -> Places | None:
-    """A line `tag x y z` for each node, after their number."""
-    del order
-    count, at = _integers(data, at)
-    spans, _ = _matches(_TAG_XYZ, data, at, count[0])
-    return text_places(spans, "f8")
+def _finder(tags: Int64) -> Callable[[Int64], Int64]:
+    """Return what finds the rows of nodes by their tags, which may be any numbers; -1: there is no such node."""
+    order = np.argsort(tags, kind="stable")
+    ordered = tags[order]
+    repeated = np.flatnonzero(ordered[1:] == ordered[:-1])
+    if len(repeated):
+        raise ReadError(f"is not a readable gmsh file: the node {ordered[repeated[0]]} stands twice in it")
+    return partial(_rows, ordered, order)
 
 
-def _binary_2(data: bytes, at: int, order: str) -> Places | None:
-    """An int and three doubles for each node, after a line with their number."""
-    count, at = _integers(data, at)
-    return binary_places(at + 4 + 28 * np.arange(count[0], dtype=np.int64), f"{order}f8")
+def _rows(ordered: Int64, order: Int64, wanted: Int64) -> Int64:
+    if not len(ordered):
+        return np.full(wanted.shape, -1)
+    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
+    return np.where(ordered[at] == wanted, order[at], -1)
 
 
-def _text_4(data: bytes, at: int, order: str) -> Places | None:
-    """Blocks: a line `dimension entity parametric count`, the tags, then `x y z`, with u v w behind if parametric."""
-    del order
-    (blocks, *_), at = _integers(data, at)
-    spans: list[Span] = []
-    for _ in range(blocks):
-        (_, _, _, count), at = _integers(data, at)
-        for _ in range(count):
-            at = data.index(b"\n", at) + 1
-        found, at = _matches(_XYZ, data, at, count)
-        if len(found) < count:
-            return None
-        spans += found
-    return text_places(spans, "f8")
+def _vertices(block: Block, find: Callable[[Int64], Int64]) -> Int64:
+    rows = find(block.nodes)
+    missing = rows < 0
+    if missing.any():
+        element = block.ids[missing.any(axis=1)][0]
+        raise ReadError(f"the element {element} has the node {block.nodes[missing][0]}, which is not in $Nodes")
+    order = ORDER.get(TYPES[block.kind][0])
+    return rows if order is None else rows[:, order]
 
 
-def _binary_4(data: bytes, at: int, order: str) -> Places | None:
-    """The same with ints, size_t and doubles."""
-    (blocks, *_) = struct.unpack_from(f"{order}4Q", data, at)
-    at += 32
-    first = []
-    for _ in range(blocks):
-        dimension, _, parametric, count = struct.unpack_from(f"{order}3iQ", data, at)
-        at += 20 + 8 * count
-        width = 8 * (3 + (dimension if parametric else 0))
-        first.append(at + width * np.arange(count, dtype=np.int64))
-        at += width * count
-    return binary_places(np.concatenate(first), f"{order}f8") if first else None
+def _joined(places: Sequence[Places]) -> Places:
+    ends = [one.end for one in places if one.end is not None]
+    begin = np.concatenate([one.begin for one in places])
+    return Places(begin, np.concatenate(ends) if ends else None, places[0].dtype)
 
 
-def _integers(data: bytes, at: int) -> tuple[list[int], int]:
-    line = _LINE.match(data, at)
-    return ([int(word) for word in line[0].split()], line.end()) if line else ([0], at)
+def _labels(file: File) -> dict[str, list[Int64]]:
+    """Entities and physical groups of the elements; where an entity is in several, also a number for each set."""
+    sets = [
+        file.groups.get((block.dimension, int(block.entities[0])), ()) if block.physical is None else ()
+        for block in file.blocks
+    ]
+    physical = [
+        np.full(len(block.ids), groups[0] if groups else 0) if block.physical is None else block.physical
+        for block, groups in zip(file.blocks, sets, strict=True)
+    ]
+    labels = {_ENTITY: [block.entities for block in file.blocks]}
+    if any(values.any() for values in physical):
+        labels[_PHYSICAL] = physical
+    if any(len(groups) > 1 for groups in sets):
+        known: dict[frozenset[int], int] = {frozenset(): 0}
+        codes = [known.setdefault(frozenset(groups), len(known)) for groups in sets]
+        labels[_SETS] = [np.full(len(block.ids), code) for block, code in zip(file.blocks, codes, strict=True)]
+    return labels
 
 
-def _matches(pattern: re.Pattern[bytes], data: bytes, at: int, count: int) -> tuple[list[Span], int]:
-    """Match a pattern `count` times in a row; the spans of its three groups, and the offset behind."""
-    spans = []
-    for _ in range(count):
-        match = pattern.match(data, at)
-        if match is None:
-            break
-        spans.append((*match.span(1), *match.span(2), *match.span(3)))
-        at = match.end()
-    return spans, at
+def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
+    """The array of groups, if a simplex is in one."""
+    name = _SETS if _SETS in labels else _PHYSICAL
+    kind = "tetra" if any(run.type == "tetra" for run in cells) else "triangle"
+    runs = zip(cells, labels.get(name, ()), strict=False)
+    return (name,) if any(run.type == kind and values.any() for run, values in runs) else ()
+
+
+def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, list[Int64]]) -> Arrays:
+    """Labels and views; a view that cannot be read is left out."""
+    point: dict[str, Any] = {}
+    cell: dict[str, Any] = dict(labels)
+    ends = np.cumsum([len(run.vertices) for run in cells])
+    ids = np.concatenate([run.ids for run in cells if run.ids is not None])
+    for section, numbers in file.views:
+        arrays, wanted = (point, tags) if section == "NodeData" else (cell, ids)
+        try:
+            name, step, values = _view(numbers, wanted)
+        except ReadError:
+            continue
+        name = f"{name} step {step}" if name in arrays else name
+        arrays[name] = values if section == "NodeData" else np.split(values, ends[:-1])
+    return Arrays(point, cell, file.names)
+
+
+def _view(numbers: Numbers, wanted: Int64) -> tuple[str, int, NDArray[np.float64]]:
+    """Read the name of some data, their step in time, and the values of nodes or elements; nan: there are none."""
+    here = replace(numbers)
+    titles = [here.line() for _ in range(here.count())]
+    for _ in range(here.count()):
+        here.line()
+    about = [here.count() for _ in range(here.count())]
+    if not titles or len(about) < 3 or about[1] < 1:
+        raise ReadError("is not a readable gmsh file: data have no name or no size")
+    tags, places = here.tagged(about[2], about[1])
+    order = np.argsort(tags, kind="stable")
+    rows = _rows(tags[order], order, wanted)
+    values = np.full((len(wanted), about[1]), np.nan)
+    values[rows >= 0] = places.read(here.data)[rows[rows >= 0]]
+    name = titles[0].decode("utf-8", "replace").strip().strip('"')
+    return name, about[0], values[:, 0] if about[1] == 1 else values

@@ -1,18 +1,121 @@
-"""Coordinates in Wavefront .obj files.
+"""Wavefront .obj files: lines `v x y z [w | r g b]`, `f a/ta/na b/tb/nb ...`, `l a b ...`, `p a ...`.
 
-Source: the lines `v x y z [w | r g b]` of the Wavefront OBJ specification.
+Source: Wavefront, "Object Files (.obj)", Advanced Visualizer Manual, appendix B1.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
 
-from meshfix_cli.meshfile.splice import Places, text_places
+import numpy as np
+from numpy.typing import NDArray
 
-_VERTEX = re.compile(rb"^[ \t]*v[ \t]+(\S+)[ \t]+(\S+)[ \t]+(\S+)", re.MULTILINE)
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.source import Cells, Source
+from meshfix_cli.meshfile.splice import InPlace, Places
+from meshfix_cli.meshfile.text import Spans, integers_at, line_words
+
+_CONTINUED = re.compile(rb"\\[ \t]*[\r\n]")
+_COMMA = re.compile(rb"(?:^|[\r\n])[ \t]*[vflp]\b[^\r\n#]*(,)")  # no part of a number, but the kernels end words there
+_UNTOLD = {
+    "objects and groups": {b"o", b"g"}, "materials": {b"usemtl", b"mtllib"}, "smoothing groups": {b"s"},
+    "texture coordinates": {b"vt"}, "normals": {b"vn"},
+}  # fmt: skip
+_CORNERS = {b"f": 3, b"l": 2, b"p": 1}  # at least
+_NAMES = {b"f": "face", b"l": "line", b"p": "point"}
+_TYPES = {(b"f", 3): "triangle", (b"f", 4): "quad", (b"l", 2): "line"}
+_LARGER = {b"f": "polygon", b"l": "polyline", b"p": "vertex"}
 
 
-def find_coordinates(data: bytes) -> Places | None:
-    """Find the vertices in the order of their numbers."""
-    spans = [(*v.span(1), *v.span(2), *v.span(3)) for v in _VERTEX.finditer(data)]
-    return text_places(spans, "f8") if spans else None
+def parse(data: bytes) -> Source | None:
+    """Read vertices, faces, lines and points; None where lines are continued by a backslash."""
+    if _CONTINUED.search(data):
+        return None
+    comma = _COMMA.search(data) if b"," in data else None
+    if comma:
+        raise in_line(data, comma.start(1), "there is a comma between the numbers")
+    ends, keywords = first_words(data)
+    at = {keyword: ends[keywords == keyword] for keyword in (b"v", *_CORNERS)}
+    coordinates = Places.of_text(_coordinates(data, at[b"v"]))
+    cells, corners = [], []
+    for keyword, minimum in _CORNERS.items():
+        for rows, spans in _runs(data, at[keyword]):
+            count = spans.shape[1]
+            if count < minimum:
+                raise in_line(data, int(at[keyword][rows[0]]), f"a {_NAMES[keyword]} of {count} vertices")
+            before = np.searchsorted(at[b"v"], at[keyword][rows])
+            vertices = _vertices(data, spans, before, len(at[b"v"]))
+            if keyword == b"p":  # as many cells as there are numbers
+                vertices, rows = vertices.reshape(-1, 1), np.repeat(rows, count)
+            cells.append(Cells(_TYPES.get((keyword, count), _LARGER[keyword]), vertices, rows))
+            corners.append(partial(Places.of_text, spans, "i8"))
+    untold = _untold(data, coordinates, set(np.unique(keywords).tolist()))
+    return Source(coordinates.read(data), cells, InPlace(data, coordinates, corners), untold=untold)
+
+
+def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:
+    """Return the offset behind the first word of each line that has one, and the words, cut after nine bytes."""
+    raw = np.frombuffer(data, dtype=np.uint8)
+    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0  # the mark of UTF-8
+    lines = np.concatenate([[start], np.flatnonzero((raw == ord("\n")) | (raw == ord("\r"))) + 1])
+    spans = line_words(data, lines, 1)[:, 0]
+    begin, end = spans[spans[:, 0] >= 0].T
+    words = np.zeros((len(begin), 9), dtype=np.uint8)
+    for i in range(9):
+        inside = begin + i < end
+        words[inside, i] = raw[begin[inside] + i]
+    return end, words.view("S9")[:, 0]
+
+
+def in_line(data: bytes, at: int, what: str) -> ReadError:
+    """Return the error that tells what is wrong at an offset."""
+    number = data.count(b"\n", 0, at) + 1
+    return ReadError(f"line {number}: {what}")
+
+
+def _coordinates(data: bytes, at: NDArray[np.int64]) -> Spans:
+    spans = line_words(data, at, 3)
+    if not len(spans):
+        raise ReadError("is not a readable obj file: it has no vertices")
+    short = spans[:, 2, 0] < 0
+    if short.any():
+        raise in_line(data, int(at[short.argmax()]), "a vertex of less than three coordinates")
+    return spans
+
+
+def _runs(data: bytes, at: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64], Spans]]:
+    """Group lines by their number of corners: rows (m,) of the lines, and spans (m, k, 2) of the corners."""
+    raw = np.frombuffer(data, dtype=np.uint8)
+    rows, width = np.arange(len(at)), 4
+    while len(rows):
+        spans = line_words(data, at[rows], width + 1)
+        behind = (spans[:, :, 0] < 0) | (raw[spans[:, :, 0]] == ord("#"))
+        counts = np.where(behind.any(axis=1), behind.argmax(axis=1), width + 1)
+        for count in np.unique(counts[counts <= width]).tolist():
+            yield rows[counts == count], spans[counts == count, :count]
+        rows, width = rows[counts > width], 2 * width
+
+
+def _vertices(data: bytes, spans: Spans, before: NDArray[np.int64], n: int) -> NDArray[np.int64]:
+    """Rows of the points: from 1 in the file, or negative, from the last vertex `before` the line."""
+    numbers = integers_at(data, spans)
+    rows = np.where(numbers < 0, before[:, None] + numbers, numbers - 1)
+    outside = (rows < 0) | (rows >= n)
+    if outside.any():
+        at = int(spans[outside][0, 0])
+        raise in_line(data, at, f"there is no vertex {numbers[outside][0]}; the file has {n:,}")
+    return rows
+
+
+def _untold(data: bytes, coordinates: Places, keywords: set[Any]) -> tuple[str, ...]:
+    assert coordinates.end is not None
+    fourth = line_words(data, coordinates.end[:, 2], 1)[:, 0, 0]
+    found = [what for what, names in _UNTOLD.items() if names & keywords]
+    if b"#" in data:
+        found.insert(0, "comments")
+    if (np.frombuffer(data, dtype=np.uint8)[fourth[fourth >= 0]] != ord("#")).any():
+        found.append("colours or weights of vertices")
+    return tuple(found)

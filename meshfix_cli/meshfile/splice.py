@@ -1,81 +1,163 @@
-"""Writing by splicing: only the coordinates that moved are replaced in the original bytes."""
+"""Writing by splicing: only the numbers that changed are replaced in the original bytes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Span = tuple[int, int, int, int, int, int]  # start and end of x, y and z
+from meshfix_cli import _kernels
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.text import Spans, numbers_at
+
+Points = NDArray[np.floating[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Edits:
+    """Words that take the place of others.
+
+    Attributes
+    ----------
+    spans : (k, 2) int64
+        What is replaced.
+    words : bytes
+    word_spans : (k, 2) int64
+        What replaces it, in `words`.
+    """
+
+    spans: Spans
+    words: bytes
+    word_spans: Spans
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where a file holds its coordinates, point by point in the file's order.
+    """Where a file holds rows of numbers.
 
     Attributes
     ----------
-    start : (n, 3) int64
-        Offset of the first byte of each coordinate.
-    end : (n, 3) int64 or None
-        Offset behind the text of each coordinate; None for binary numbers.
+    begin : (n, k) int64
+        Offset of the first byte of each number.
+    end : (n, k) int64 or None
+        Offset behind the text of each number; None for binary numbers.
     dtype : numpy dtype
         Type of the numbers, with its byte order where they are binary.
+    longest : int
+        Characters that the format allows for a number; 0: any number of them.
     """
 
-    start: NDArray[np.int64]
+    begin: NDArray[np.int64]
     end: NDArray[np.int64] | None
     dtype: np.dtype[Any]
+    longest: int = 0
+
+    @classmethod
+    def of_text(cls, spans: Spans, dtype: str = "f8", longest: int = 0) -> Places:
+        """Places of the words at spans (n, k, 2)."""
+        return cls(spans[..., 0], spans[..., 1], np.dtype(dtype), longest)
+
+    @classmethod
+    def of_rows(cls, first: NDArray[np.int64], columns: int, dtype: str) -> Places:
+        """Places of binary rows of `columns` numbers without gaps, from the offset of each row (n,)."""
+        kind = np.dtype(dtype)
+        return cls(first[:, None] + kind.itemsize * np.arange(columns), None, kind)
+
+    @property
+    def spans(self) -> Spans:
+        """(n, k, 2) int64."""
+        end = self.begin + self.dtype.itemsize if self.end is None else self.end
+        return np.stack([self.begin, end], axis=-1)
+
+    def read(self, data: bytes) -> Any:
+        """Return the numbers (n, k) in the machine's byte order; ReadError where there are none."""
+        if self.end is not None:
+            return numbers_at(data, self.spans, self.dtype)
+        size = self.dtype.itemsize
+        if self.begin.size and not 0 <= self.begin.min() <= self.begin.max() <= len(data) - size:
+            raise ReadError("is truncated: its numbers reach behind its end")
+        cells = self.begin.reshape(-1, 1) + np.arange(size)
+        values = np.frombuffer(data, dtype=np.uint8)[cells].view(self.dtype).reshape(self.begin.shape)
+        return values.astype(self.dtype.newbyteorder("="))
+
+    def rounded(self, values: Points) -> Points:
+        """Return numbers (n, k) as the file can hold them."""
+        values = values.astype(self.dtype.newbyteorder("="))
+        if self.longest:
+            words, spans = self._encode(values.ravel())
+            values = numbers_at(words, spans, self.dtype).reshape(values.shape)
+        return values
+
+    def replace(self, which: NDArray[np.bool_], values: Points) -> Edits:
+        """Write numbers (n, k) where `which` (n, k) is True."""
+        return Edits(np.ascontiguousarray(self.spans[which]), *self._encode(values[which]))
+
+    def exchange(self, data: bytes, rows: NDArray[np.integer[Any]]) -> Edits:
+        """Exchange the first two numbers of some rows."""
+        spans = self.spans[rows, :2]
+        words = [data[first:last] for first, last in spans[:, ::-1].reshape(-1, 2).tolist()]
+        ends = np.cumsum([0, *map(len, words)])
+        return Edits(np.ascontiguousarray(spans.reshape(-1, 2)), b"".join(words), _pairs(ends))
+
+    def _encode(self, values: Points) -> tuple[bytes, Spans]:
+        if self.end is None:
+            return values.astype(self.dtype).tobytes(), _pairs(np.arange(len(values) + 1) * self.dtype.itemsize)
+        return _kernels.shortest(values.astype(np.float64), self.dtype.itemsize == 4, self.longest)
 
 
-def splice(
-    data: bytes, places: Places, original: NDArray[np.floating[Any]], points: NDArray[np.floating[Any]]
-) -> bytes | None:
-    """Return the file with other coordinates; what did not change keeps its characters.
+@dataclass(frozen=True, eq=False)
+class InPlace:
+    """The layout of a file whose numbers stand in its bytes as they are.
 
-    Text is the shortest that reads back to the same number of the file's type.
-
-    Parameters
+    Attributes
     ----------
-    original, points : (n, 3) float
-        As the file was read, and as it shall read.
-
-    Returns
-    -------
-    bytes or None
-        None where the places do not hold the original coordinates.
+    data : bytes
+    coordinates : Places
+        A row for each point.
+    corners : sequence of callables
+        For each run of cells what gives the places of its vertices, a row for each cell.
     """
-    if len(places.start) != len(points) or points.shape[1] != 3:
-        return None
-    rows, columns = np.nonzero((points != original) & ~np.isnan(points))
-    begin, dtype = places.start[rows, columns], places.dtype
-    old, new = original[rows, columns].astype(dtype), points[rows, columns].astype(dtype)
-    if places.end is None:
-        cells = begin[:, None] + np.arange(dtype.itemsize)
-        buffer = np.frombuffer(data, dtype=np.uint8).copy()
-        if not np.array_equal(buffer[cells].copy().view(dtype).ravel(), old):
-            return None
-        buffer[cells] = new.view(np.uint8).reshape(cells.shape)
-        return buffer.tobytes()
-    pieces, done = [], 0
-    for first, last, was, now in zip(begin.tolist(), places.end[rows, columns].tolist(), old, new, strict=True):
-        if dtype.type(data[first:last]) != was:
-            return None
-        pieces += [data[done:first], str(now).encode()]
-        done = last
-    return b"".join([*pieces, data[done:]])
+
+    data: bytes
+    coordinates: Places
+    corners: Sequence[Callable[[], Places]]
+
+    def rounded(self, points: Points) -> Points:
+        """Return points (n, d) as the file can hold them."""
+        return self.coordinates.rounded(points)
+
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
+        """Return the file with other points (n, d), and with the first two vertices of some cells exchanged.
+
+        Parameters
+        ----------
+        original : (n, d) float
+            The points as they were read.
+        reversed_cells : mapping
+            Rows of cells by the number of their run.
+        """
+        changed = self.coordinates.replace(differing(original, points), points)
+        swaps = (self.corners[run]().exchange(self.data, rows) for run, rows in reversed_cells.items())
+        return apply(self.data, [changed, *swaps])
 
 
-def text_places(spans: Sequence[Span], dtype: str) -> Places:
-    """Build places of text numbers from the span of each point."""
-    table = np.array(spans, dtype=np.int64).reshape(-1, 3, 2)
-    return Places(table[:, :, 0], table[:, :, 1], np.dtype(dtype))
+def differing(original: Points, points: Points) -> NDArray[np.bool_]:
+    """Return where coordinates differ; points that are not a number stay as they are."""
+    return (points != original) & ~np.isnan(points)
 
 
-def binary_places(first: NDArray[np.int64], dtype: str) -> Places:
-    """Build places of binary points, three numbers in a row, from the offset of each point."""
-    kind = np.dtype(dtype)
-    return Places(first[:, None] + kind.itemsize * np.arange(3), None, kind)
+def apply(data: bytes, edits: Sequence[Edits]) -> bytes:
+    """Return the data with all edits made; they may come in any order."""
+    starts = np.cumsum([0, *(len(edit.words) for edit in edits)])
+    spans = np.concatenate([edit.spans for edit in edits])
+    word_spans = np.concatenate([edit.word_spans + start for edit, start in zip(edits, starts, strict=False)])
+    order = np.argsort(spans[:, 0], kind="stable")
+    return _kernels.replace(data, spans[order], b"".join(edit.words for edit in edits), word_spans[order])
+
+
+def _pairs(offsets: NDArray[np.int64]) -> Spans:
+    """Spans (k, 2) between consecutive offsets (k+1,)."""
+    return np.stack([offsets[:-1], offsets[1:]], axis=1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""meshio behind a wall: what it prints is swallowed, what it raises becomes one sentence, what it writes is checked."""
+"""meshio behind a wall: what it prints is swallowed, what it raises becomes one sentence."""
 
 from __future__ import annotations
 
@@ -16,73 +16,78 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 
-SIMPLEX = {2: "triangle", 3: "tetra"}
-ROUNDING = 1e-4  # relative to the size of the mesh: more than any format rounds, less than any mesh can bear
+# Cells that meshio knows, and those that most formats do; others are left out of what it writes.
+_KNOWN = frozenset(meshio._mesh.topological_dimension)
+_COMMON = frozenset({"line", "triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"})
+_SPATIAL = ("obj", "off", "ply", "stl")  # these have no plane meshes
 
 
-def read_bytes(data: bytes, form: Format) -> Any:
-    """Read what came from a stream; meshio wants a file."""
+def read_bytes(data: bytes, form: Format) -> Source:
+    """Read a file, which meshio wants to be one on a disk."""
     with tempfile.TemporaryDirectory(prefix="meshfix-") as folder:
         path = Path(folder) / "stream"
         path.write_bytes(data)
-        return read_path(path, form)
+        with _sentences(ReadError, f"is not a readable {form.name} file"):
+            mesh = meshio.read(path, file_format=form.reader)
+            missing = formats.missing_part(data, form, sum(len(block.data) for block in mesh.cells))
+            if missing:
+                raise ReadError(f"is truncated: {missing}")
+            return _source(mesh)
 
 
-def read_path(path: Path, form: Format) -> Any:
-    """Read a file; the arrays come in the machine's byte order."""
-    with _sentences(ReadError, f"is not a readable {form.name} file"):
-        source = meshio.read(path, file_format=form.reader)
-        missing = formats.missing_part(path, form, sum(len(block.data) for block in source.cells))
-        _make_native(source)
-    if missing:
-        raise ReadError(f"is truncated: {missing}")
-    return source
-
-
-def write_path(path: Path, source: Any, form: Format, dimension: int) -> NDArray[np.float64]:
-    """Write a file and read it again; return the points (n, 3) as it holds them.
-
-    Raises
-    ------
-    WriteError
-        The format cannot hold the simplices of this dimension, or rounds them too much.
-    """
-    out = source.copy()
-    if form.reader != "gmsh":  # these mean nothing elsewhere, and break some writers
-        out.point_data.pop("gmsh:dim_tags", None)
-        out.cell_sets.pop("gmsh:bounding_entities", None)
-    if form.name == "stl":
-        out.cell_data.pop("facet_normals", None)  # they were those of the mesh before
-    with _sentences(WriteError, f"cannot be written as {form.name}"):
-        meshio.write(path, out, file_format=form.name, **formats.options(form))
+def write_path(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
+    """Write as much of a source, with other points (n, d), as the format takes; WriteError where that is nothing."""
+    simplex = "tetra" if any(run.type == "tetra" for run in source.cells) else "triangle"
+    attempts = [(_KNOWN, source.arrays), (_COMMON, source.arrays), ({simplex}, source.arrays), ({simplex}, Arrays())]
+    if form.name in _SPATIAL and points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    for types, arrays in attempts:
+        try:
+            with _sentences(WriteError, f"cannot be written as {form.name}"):
+                kept = [i for i, run in enumerate(source.cells) if run.type in types and len(run.vertices)]
+                meshio.write(path, _mesh(source, points, arrays, kept, form), form.name, **formats.options(form))
+            break
+        except WriteError:
+            if (types, arrays) == attempts[-1]:
+                raise
     if len(list(path.parent.iterdir())) > 1:
         raise WriteError(f"cannot be written as {form.name}: it takes more than one file")
-    expected = simplices_of(source, dimension)
-    points = np.array(source.points, dtype=np.float64)
-    size = float(np.ptp(points[expected], axis=(0, 1)).max())
-    try:
-        back = read_path(path, form)
-        corners = _spatial(back.points)[simplices_of(back, dimension)]
-        difference = np.abs(corners - _spatial(points)[expected]).max()
-    except (MeshfixError, IndexError, ValueError) as error:
-        raise WriteError(f"cannot be written as {form.name}: what was written does not read back") from error
-    if not difference <= ROUNDING * size:
-        raise WriteError(f"cannot be written as {form.name}: the coordinates do not read back")
-    points[expected] = corners[:, :, : points.shape[1]]
-    return points
 
 
-def simplices_of(source: Any, dimension: int) -> NDArray[np.int64]:
-    """Return all simplices (m, d+1) in the order of the file."""
-    blocks = [block.data for block in source.cells if block.type == SIMPLEX[dimension]]
-    return np.concatenate(blocks or [np.empty((0, dimension + 1), dtype=np.int64)])
+def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kept: list[int], form: Format) -> Any:
+    def name(text: str) -> str:
+        return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
+
+    return meshio.Mesh(
+        points,
+        [(source.cells[i].type, source.cells[i].vertices) for i in kept],
+        point_data={name(key): values for key, values in arrays.point.items()},
+        cell_data={name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()},
+        field_data=dict(arrays.groups),
+        point_sets=dict(arrays.point_sets),
+        cell_sets={key: [runs[i] for i in kept] for key, runs in arrays.cell_sets.items()},
+    )
 
 
-def _spatial(points: Any) -> NDArray[np.float64]:
-    """Points with three coordinates."""
-    p = np.asarray(points, dtype=np.float64)
-    return np.hstack([p, np.zeros((len(p), 3 - p.shape[1]))]) if p.shape[1] < 3 else p
+def _source(mesh: Any) -> Source:
+    points = _native(mesh.points)
+    cells = [Cells(block.type, _native(block.data)) for block in mesh.cells]
+    cell = {name: [_native(data) for data in runs] for name, runs in mesh.cell_data.items()}
+    arrays = Arrays(
+        point={name: _native(data) for name, data in mesh.point_data.items()},
+        cell=cell,
+        groups=mesh.field_data,
+        point_sets=mesh.point_sets,
+        cell_sets=mesh.cell_sets,
+    )
+    return Source(
+        points if points.dtype.kind == "f" else points.astype(np.float64),
+        cells,
+        load=lambda: arrays,
+        regions=tuple(name for name in REGIONS if name in cell),
+    )
 
 
 @contextlib.contextmanager
@@ -92,24 +97,16 @@ def _sentences(kind: type[MeshfixError], what: str) -> Iterator[None]:
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             yield
+    except (MeshfixError, OSError):
+        raise
     except ImportError as error:
         raise kind(f"{what}: that needs the package {error.name}") from error
-    except OSError:
-        raise
     except (Exception, SystemExit) as error:
         said = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error).strip()
         reason = " ".join(said.split())[:200] or f"{type(error).__name__} in meshio"
         raise kind(f"{what} ({reason})") from error
 
 
-def _make_native(source: Any) -> None:
-    """Turn arrays to the machine's byte order: readers of binary files leave them as they were there."""
-
-    def native(array: Any) -> Any:
-        return array.astype(array.dtype.newbyteorder("=")) if isinstance(array, np.ndarray) else array
-
-    source.points = native(source.points)
-    for block in source.cells:
-        block.data = native(block.data)
-    source.point_data = {name: native(data) for name, data in source.point_data.items()}
-    source.cell_data = {name: [native(data) for data in blocks] for name, blocks in source.cell_data.items()}
+def _native(array: Any) -> Any:
+    """Turn an array to the machine's byte order: readers of binary files leave it as it was there."""
+    return array.astype(array.dtype.newbyteorder("=")) if isinstance(array, np.ndarray) else array

@@ -1,0 +1,271 @@
+"""A mesh as it came from a file: what moves, what is held, and how moved points go back into the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import InvalidMeshError, ReadError
+from meshfix_cli.mesh import CELL_NAMES, LARGEST_COORDINATE, Mesh, Topology
+from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.plane import plane_basis
+from meshfix_cli.meshfile.source import Cells, Source
+
+SIMPLEX = {2: "triangle", 3: "tetra"}
+
+
+@dataclass(frozen=True, eq=False)
+class Document:
+    """A mesh as it came from a file, and all that is needed to write it back.
+
+    Attributes
+    ----------
+    name : str
+        The path, or "<stdin>".
+    mesh : Mesh
+    format : Format
+    ids : (m,) int64
+        For each simplex of the mesh the number that the file gives to it, or, where it gives none, its position
+        among all cells of the file, from 0.
+    fixed : dict
+        Number of vertices held for each reason; a vertex counts for the first that applies.
+    notes : tuple of str
+        What a user should know about the file, a sentence each.
+    source : Source
+    basis : (2, 3) float64 or None
+        Spans the plane of a planar mesh in space.
+    """
+
+    name: str
+    mesh: Mesh
+    format: Format
+    ids: NDArray[np.int64]
+    fixed: dict[str, int]
+    notes: tuple[str, ...]
+    source: Source = field(repr=False)
+    basis: NDArray[np.float64] | None
+
+    @property
+    def simplices(self) -> NDArray[np.int64]:
+        """(m, d+1) int64: the simplices of the mesh as the file numbers their vertices."""
+        return _all_simplices(self.source, self.mesh.dimension)[self.mesh.topology.source]
+
+    def file_points(self, mesh: Mesh) -> NDArray[np.floating[Any]]:
+        """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
+        original = self.source.points
+        points: NDArray[np.floating[Any]] = original.copy()
+        moved = (mesh.points != self.mesh.points).any(axis=1) & mesh.topology.used
+        with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
+            if self.basis is None:
+                points[moved] = mesh.points[moved]
+            elif np.isin(self.basis, (0.0, 1.0)).all():
+                points[np.ix_(moved, self.basis.argmax(axis=1))] = mesh.points[moved]
+            else:
+                points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
+        points[moved] = self.source.rounded(points[moved])
+        return points
+
+    def as_stored(self, mesh: Mesh) -> Mesh:
+        """Return a moved mesh with the coordinates rounded as the file will hold them."""
+        return self.in_plane(self.file_points(mesh).astype(np.float64), mesh)
+
+    def in_plane(self, points: NDArray[np.float64], mesh: Mesh) -> Mesh:
+        """Return a moved mesh at points (n, 2 or 3) in the coordinates of the file."""
+        used = points[mesh.topology.used]
+        if not (np.abs(used) <= LARGEST_COORDINATE).all():
+            raise InvalidMeshError("the coordinates are too large for the numbers of the file")
+        return mesh.with_points(np.ascontiguousarray(points if self.basis is None else points @ self.basis.T))
+
+    def first_valid_as_stored(self, *meshes: Mesh) -> Mesh:
+        """Return the first of some moved meshes that is valid as the file stores it, else the best."""
+        ranked = []
+        for mesh in meshes:
+            inverted, smallest = self.as_stored(mesh).check()
+            if inverted == 0:
+                return mesh
+            ranked.append(((inverted, -smallest), mesh))
+        return min(ranked, key=lambda pair: pair[0])[1]
+
+    def is_kept_by(self, form: Format) -> bool:
+        """Whether writing in a format keeps all but the coordinates, byte for byte."""
+        return form == self.format and self.source.layout is not None
+
+    def reversed_cells(self) -> dict[int, NDArray[np.int64]]:
+        """Rows of the simplices, by the number of their run, whose numbering has the negative orientation."""
+        chosen = _runs_of_simplices(self.source, self.mesh.dimension)
+        starts = np.cumsum([0, *(len(self.source.cells[run].vertices) for run in chosen)])
+        rows = np.flatnonzero(_reversed(_all_simplices(self.source, self.mesh.dimension), self.mesh.topology))
+        which = np.searchsorted(starts, rows, side="right") - 1
+        found = {run: rows[which == i] - starts[i] for i, run in enumerate(chosen)}
+        return {run: here for run, here in found.items() if len(here)}
+
+
+def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None) -> Document:
+    """Make a document of what a file holds; the parameters are those of `read`."""
+    dimension = _dimension(source)
+    starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
+    chosen = _runs_of_simplices(source, dimension)
+    simplices = _all_simplices(source, dimension)
+    ids = np.concatenate([_ids(source.cells[i], int(starts[i])) for i in chosen])
+
+    points, basis = _solved_points(source, simplices, dimension)
+    held = {"on other cells of the file": _on_other_cells(source, chosen, len(points))}
+    if source.held is not None:
+        held["by the file"] = source.held
+    if fix is not None:
+        held[f"by --fix {fix}"] = _fixed_by(source, fix)
+    mesh = Mesh.build(points, simplices)
+    topology = mesh.topology
+    reasons = {"on the boundary": topology.boundary}
+    for key in _region_arrays(source, regions):
+        labels = np.concatenate([source.arrays.cell[key][i] for i in chosen])
+        if labels.ndim != 1:
+            raise ReadError(f"the cell data {key!r} are not labels of regions: they have {labels.shape[1]} components")
+        reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, simplices, topology))
+    fixed = {}
+    for reason, mask in {**reasons, **held}.items():
+        counted = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
+        fixed[reason] = int(counted.sum())
+        mesh = mesh.with_fixed(mask)
+    # A plane in space has no side from which the numbering could be judged, but for that of constant z.
+    seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
+    notes = _notes(mesh, len(simplices), seen_from_above)
+    return Document(name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, basis)
+
+
+def counted(number: int, singular: str, plural: str) -> str:
+    """Return a number with the word for what it counts."""
+    return f"{number:,} {singular if number == 1 else plural}"
+
+
+def with_reversed(source: Source, rows: Mapping[int, NDArray[np.int64]]) -> Source:
+    """Return a source that is to be written anew, with the first two vertices of some cells exchanged."""
+    cells = list(source.cells)
+    for run, here in rows.items():
+        vertices = cells[run].vertices.copy()
+        vertices[here, :2] = vertices[here, 1::-1]
+        cells[run] = replace(cells[run], vertices=vertices)
+    return replace(source, cells=cells)
+
+
+def _dimension(source: Source) -> int:
+    """3 where there are tetrahedra, 2 where triangles are the cells of the highest dimension."""
+    runs = [run for run in source.cells if len(run.vertices)]
+    types = {run.type for run in runs}
+    if "tetra" in types:
+        return 3
+    solid = sorted({run.type for run in runs if run.solid})
+    if "triangle" in types and not solid:
+        return 2
+    found = ", ".join(solid or sorted(types)) or "none"
+    raise ReadError(f"there are no tetrahedra and no plane mesh of triangles in it (cells: {found})")
+
+
+def _runs_of_simplices(source: Source, dimension: int) -> list[int]:
+    return [i for i, run in enumerate(source.cells) if run.type == SIMPLEX[dimension]]
+
+
+def _all_simplices(source: Source, dimension: int) -> NDArray[np.int64]:
+    """(k, d+1), in the order of the file, repetitions included."""
+    return source.vertices_of(SIMPLEX[dimension], dimension + 1)
+
+
+def _ids(run: Cells, start: int) -> NDArray[np.int64]:
+    return np.arange(start, start + len(run.vertices)) if run.ids is None else run.ids
+
+
+def _reversed(simplices: NDArray[np.int64], topology: Topology) -> NDArray[np.bool_]:
+    """(k,) bool: of all simplices of the file, those with the negative orientation; repetitions may differ."""
+    if len(topology.source) == len(simplices):
+        return topology.flipped
+    order = np.argsort(simplices, axis=1)
+    odd = np.linalg.det(np.eye(simplices.shape[1])[order]) < 0
+    group = np.unique(np.take_along_axis(simplices, order, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    positive = np.empty(group.max() + 1, dtype=bool)  # which parity of the sorted vertices is positive
+    positive[group[topology.source]] = odd[topology.source] ^ topology.flipped
+    return odd != positive[group]
+
+
+def _solved_points(
+    source: Source, simplices: NDArray[np.int64], dimension: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    points = np.asarray(source.points, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or points.shape[1] < dimension:
+        raise ReadError(f"its points have {points.shape[-1]} coordinates")
+    if points.shape[1] == dimension:
+        return points, None
+    flat = np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
+    if simplices.min() < 0 or simplices.max() >= len(points):
+        return flat, None  # Mesh.build tells what is wrong, here and below
+    used = points[np.unique(simplices)]
+    if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
+        return flat, None
+    basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))
+    with np.errstate(invalid="ignore"):  # isolated points may be anything
+        return points @ basis.T, basis
+
+
+def _on_other_cells(source: Source, chosen: list[int], n: int) -> NDArray[np.bool_]:
+    """Vertices of cells that are not solved for: lines, boundary triangles, quadrilaterals, ..."""
+    mask = np.zeros(n, dtype=bool)
+    for i, run in enumerate(source.cells):
+        if i in chosen:
+            continue
+        for row in [run.vertices] if isinstance(run.vertices, np.ndarray) else run.vertices:
+            vertices = np.asarray(row, dtype=np.int64)
+            mask[vertices[(vertices >= 0) & (vertices < n)]] = True
+    return mask
+
+
+def _fixed_by(source: Source, name: str) -> NDArray[np.bool_]:
+    if name not in source.arrays.point:
+        known = ", ".join(sorted(source.arrays.point)) or "none"
+        raise ReadError(f"there is no point data named {name!r} (found: {known})")
+    values = np.asarray(source.arrays.point[name])
+    return (values.reshape(len(values), -1) != 0).any(axis=1)
+
+
+def _region_codes(labels: NDArray[Any], simplices: NDArray[np.int64], topology: Topology) -> NDArray[np.int64]:
+    """A number for each simplex of the mesh that stands for its label, or for all labels of its repetitions."""
+    codes = np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64)
+    if len(topology.source) == len(simplices):
+        return codes
+    group = np.unique(np.sort(simplices, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    members: dict[int, set[int]] = {}
+    for which, code in zip(group.tolist(), codes.tolist(), strict=True):
+        members.setdefault(which, set()).add(code)
+    known: dict[frozenset[int], int] = {}
+    return np.array([known.setdefault(frozenset(members[g]), len(known)) for g in group[topology.source].tolist()])
+
+
+def _region_arrays(source: Source, name: str | None) -> tuple[str, ...]:
+    if name is None:
+        return source.regions
+    if name not in source.arrays.cell:
+        known = ", ".join(sorted(source.arrays.cell)) or "none"
+        raise ReadError(f"there is no cell data named {name!r} (found: {known})")
+    return (name,)
+
+
+def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
+    topology, (one, many) = mesh.topology, CELL_NAMES[mesh.dimension]
+    notes = []
+    if len(topology.simplices) < rows:
+        repeated = counted(rows - len(topology.simplices), f"{one} is a repetition", f"{many} are repetitions")
+        notes.append(f"{repeated} of another and not counted")
+    isolated = topology.n - int(topology.used.sum())
+    if isolated:
+        notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and stay as they are")
+    mirrored = int(topology.mirrored.sum())
+    if mirrored == len(topology.simplices) and seen_from_above:
+        notes.append("the elements are numbered the other way round (mirrored); solved so, the numbering is kept")
+    elif 0 < mirrored < len(topology.simplices):
+        separate = counted(mirrored, f"{one} in a separate part is", f"{many} in separate parts are")
+        notes.append(f"{separate} numbered the other way round (mirrored); solved so, the numbering is kept")
+    if not mesh.movable.any():
+        notes.append("no vertex is free to move")
+    return tuple(notes)

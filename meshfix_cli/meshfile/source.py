@@ -1,0 +1,153 @@
+"""What a file holds, whatever its format."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.meshfile.splice import Points
+
+# Cell arrays that tell materials apart: those of gmsh, MEDIT and MED, under the names that meshio gives to them.
+REGIONS = ("gmsh:physical", "medit:ref", "cell_tags")
+
+
+_SOLID = re.compile(r"(?:VTK_[A-Z]+_)?(?:tetra|hexa|wedge|pyramid|penta|voxel|polyhedron)", re.IGNORECASE)
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A run of cells of one type, in the order of the file.
+
+    Attributes
+    ----------
+    type : str
+        In meshio's words: "triangle", "tetra", "line", "triangle6", ...
+    vertices : (m, k) int
+        Rows of the points; a list of arrays where the cells have different numbers of vertices.
+    ids : (m,) int64 or None
+        The numbers that the file gives to them.
+    """
+
+    type: str
+    vertices: Any
+    ids: NDArray[np.int64] | None = None
+
+    @property
+    def solid(self) -> bool:
+        """Whether the cells fill a volume."""
+        return _SOLID.match(self.type) is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Arrays:
+    """Data beside points and cells, under the names of the file and in the shapes of meshio.
+
+    Attributes
+    ----------
+    point : dict
+        An array (n, ...) for each name.
+    cell : dict
+        For each name an array (m, ...) for each run of cells.
+    groups : dict
+        For each name of a group its number and dimension: meshio's `field_data`.
+    point_sets : dict
+        Rows of points for each name.
+    cell_sets : dict
+        For each name the rows of cells in each run.
+    """
+
+    point: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    cell: Mapping[str, Sequence[NDArray[Any]]] = field(default_factory=dict)
+    groups: Mapping[str, Any] = field(default_factory=dict)
+    point_sets: Mapping[str, Any] = field(default_factory=dict)
+    cell_sets: Mapping[str, Any] = field(default_factory=dict)
+
+
+class Layout(Protocol):
+    """Where a file holds the numbers that meshfix may change; see `splice.InPlace`."""
+
+    def rounded(self, points: Points) -> Points:
+        """Return points (n, d) as the file can hold them."""
+
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
+        """Return the file with other points (n, d), and with the first two vertices of some cells exchanged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """A file as read.
+
+    Attributes
+    ----------
+    points : (n, d) float32 or float64
+        d = 2 or 3 as in the file.
+    cells : sequence of Cells
+    layout : Layout or None
+        None: the file can only be written anew.
+    load : callable
+        Gives the arrays; they are read when they are asked for.
+    regions : tuple of str
+        Names of cell arrays that tell materials apart.
+    held : (n,) bool or None
+        Points that the file itself declares as fixed.
+    untold : tuple of str
+        What the file holds beside `arrays`, and no other format would: comments, sections, keywords.
+    """
+
+    points: Points
+    cells: Sequence[Cells]
+    layout: Layout | None = None
+    load: Callable[[], Arrays] = Arrays
+    regions: tuple[str, ...] = ()
+    held: NDArray[np.bool_] | None = None
+    untold: tuple[str, ...] = ()
+
+    @cached_property
+    def arrays(self) -> Arrays:
+        """What `load` gives."""
+        return self.load()
+
+    def rounded(self, points: Points) -> Points:
+        """Return points (n, d) as the file can hold them."""
+        return points if self.layout is None else self.layout.rounded(points)
+
+    def vertices_of(self, kind: str, corners: int) -> NDArray[np.int64]:
+        """Return the vertices (k, corners) of all cells of a type, in the order of the file."""
+        runs = [run.vertices for run in self.cells if run.type == kind]
+        return np.concatenate(runs or [np.empty((0, corners), dtype=np.int64)])
+
+    def lost_in(self, other: Source) -> tuple[str, ...]:
+        """Name what another source, written from this one, does not hold."""
+        mine, theirs = self.arrays, other.arrays
+        types = {run.type for run in other.cells}
+        lost = [f"{run.type} cells" for run in self.cells if run.type not in types]
+        found = [np.asarray(values) for values in theirs.point.values()]
+        lost += [f"point data {name}" for name, values in mine.point.items() if not _is_among(values, found)]
+        found = [np.concatenate(runs) for runs in theirs.cell.values()]
+        for name, runs in mine.cell.items():
+            if not _is_among(np.concatenate(runs), found):
+                lost.append(f"cell data {name}")
+        for kind in ("groups", "point_sets", "cell_sets"):
+            lost += [f"group {name}" for name in getattr(mine, kind) if name not in getattr(theirs, kind)]
+        return (*dict.fromkeys(lost), *self.untold)
+
+
+def _is_among(values: Any, found: Sequence[NDArray[Any]]) -> bool:
+    """Whether one of some arrays has the same values, but for what seven digits cannot hold."""
+    mine = np.asarray(values).ravel()
+    for other in found:
+        theirs = other.ravel()
+        if mine.size != theirs.size:
+            continue
+        if mine.dtype.kind in "fiu" and theirs.dtype.kind in "fiu":
+            if np.allclose(mine, theirs, 1e-6, 0.0, equal_nan=True):
+                return True
+        elif np.array_equal(mine, theirs):
+            return True
+    return False

@@ -1,0 +1,70 @@
+"""Numbers in the text of a file; whatever is not what it should be is named with its line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from meshfix_cli import _kernels
+from meshfix_cli.errors import ReadError
+
+Spans = NDArray[np.int64]  # (..., 2): the offset of the first byte of a word, and the offset behind its last
+
+
+def words(data: bytes, at: int, count: int) -> Spans:
+    """Return the spans (count, 2) of the next words; blanks, line ends and commas separate them.
+
+    Raises
+    ------
+    ReadError
+        The file ends before.
+    """
+    spans = _kernels.find_words(data, np.array([at], dtype=np.int64), count, False)
+    if len(spans) < count:
+        raise ReadError(f"is truncated: {count:,} numbers are announced in line {_line(data, at)}")
+    return spans
+
+
+def line_words(data: bytes, offsets: ArrayLike, count: int) -> Spans:
+    """Return the spans (k, count, 2) of the first words from each offset (k,) to the end of its line; -1: none."""
+    at = np.ascontiguousarray(offsets, dtype=np.int64)
+    return _kernels.find_words(data, at, count, True).reshape(len(at), count, 2)
+
+
+def integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int64], int]:
+    """Return the next integers (count,) and the offset behind them; ReadError where there are not as many."""
+    values, end, bad = _kernels.scan_integers(data, at, count)
+    if bad >= 0:
+        raise _not_a_number(data, bad, "an integer")
+    return values, end
+
+
+def integers_at(data: bytes, spans: Spans) -> NDArray[np.int64]:
+    """Return the integers (...) of words, up to a slash in them; ReadError where one is not an integer."""
+    flat = np.ascontiguousarray(spans.reshape(-1, 2))
+    values, bad = _kernels.integers(data, flat)
+    if bad >= 0:
+        raise _not_a_number(data, int(flat[bad, 0]), "an integer")
+    return values.reshape(spans.shape[:-1])
+
+
+def numbers_at(data: bytes, spans: Spans, dtype: np.dtype[Any]) -> NDArray[np.floating[Any]]:
+    """Return the numbers (...) of words, in float32 or float64; ReadError where one is not a number."""
+    flat = np.ascontiguousarray(spans.reshape(-1, 2))
+    values, bad = _kernels.numbers(data, flat, dtype.itemsize == 4)
+    if bad >= 0:
+        raise _not_a_number(data, int(flat[bad, 0]), "a number")
+    return values.reshape(spans.shape[:-1]).astype(dtype, copy=False)
+
+
+def _not_a_number(data: bytes, at: int, what: str) -> ReadError:
+    if not 0 <= at < len(data):
+        return ReadError("is truncated: a number is missing" + (" at its end" if at >= len(data) else ""))
+    word = data[at : at + 40].replace(b",", b" ").split(maxsplit=1)[0].decode("latin-1")
+    return ReadError(f"line {_line(data, at)}: {word!r} is not {what}")
+
+
+def _line(data: bytes, at: int) -> int:
+    return data.count(b"\n", 0, at) + 1

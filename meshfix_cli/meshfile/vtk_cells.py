@@ -1,0 +1,100 @@
+"""The cells of VTK, which its legacy and XML files share: their numbers, names and runs.
+
+Source: VTK, "vtkCellType.h".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.source import Cells
+
+# meshio's name (ours where it has none) and the number of vertices; 0: any.
+TYPES = {
+    0: ("empty", 0), 1: ("vertex", 1), 2: ("poly_vertex", 0), 3: ("line", 2), 4: ("poly_line", 0),
+    5: ("triangle", 3), 6: ("triangle_strip", 0), 7: ("polygon", 0), 8: ("pixel", 4), 9: ("quad", 4),
+    10: ("tetra", 4), 11: ("voxel", 8), 12: ("hexahedron", 8), 13: ("wedge", 6), 14: ("pyramid", 5),
+    15: ("penta_prism", 10), 16: ("hexa_prism", 12), 21: ("line3", 3), 22: ("triangle6", 6), 23: ("quad8", 8),
+    24: ("tetra10", 10), 25: ("hexahedron20", 20), 26: ("wedge15", 15), 27: ("pyramid13", 13), 28: ("quad9", 9),
+    29: ("hexahedron27", 27), 30: ("quad6", 6), 31: ("wedge12", 12), 32: ("wedge18", 18), 33: ("hexahedron24", 24),
+    34: ("triangle7", 7), 35: ("line4", 4), 36: ("polygon_quadratic", 0), 37: ("pyramid19", 19),
+    41: ("polyhedron", 0), 42: ("polyhedron", 0),
+    68: ("VTK_LAGRANGE_CURVE", 0), 69: ("VTK_LAGRANGE_TRIANGLE", 0), 70: ("VTK_LAGRANGE_QUADRILATERAL", 0),
+    71: ("VTK_LAGRANGE_TETRAHEDRON", 0), 72: ("VTK_LAGRANGE_HEXAHEDRON", 0), 73: ("VTK_LAGRANGE_WEDGE", 0),
+    74: ("VTK_LAGRANGE_PYRAMID", 0), 75: ("VTK_BEZIER_CURVE", 0), 76: ("VTK_BEZIER_TRIANGLE", 0),
+    77: ("VTK_BEZIER_QUADRILATERAL", 0), 78: ("VTK_BEZIER_TETRAHEDRON", 0), 79: ("VTK_BEZIER_HEXAHEDRON", 0),
+    80: ("VTK_BEZIER_WEDGE", 0), 81: ("VTK_BEZIER_PYRAMID", 0),
+}  # fmt: skip
+_ORDER = {13: [0, 2, 1, 3, 5, 4]}  # the wedge of meshio, from that of VTK, and back
+_MOST_RUNS = 1000  # above, cells of a type are gathered from all over the file
+
+
+class Run(NamedTuple):
+    """Cells of one type with the same number of vertices.
+
+    Attributes
+    ----------
+    type : str
+    rows : (k,) int64
+        Which cells of the file they are.
+    vertices : (k, size) int64
+        In meshio's order.
+    """
+
+    type: str
+    rows: NDArray[np.int64]
+    vertices: NDArray[np.int64]
+
+    @property
+    def cells(self) -> Cells:
+        """The run as sources hold it; its `ids` are `rows`."""
+        return Cells(self.type, self.vertices, self.rows)
+
+
+def runs(types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivity: NDArray[np.int64]) -> list[Run]:
+    """Cut cells into runs, in the order of the file where they are not too many.
+
+    Parameters
+    ----------
+    types : (m,) int
+        Numbers of VTK.
+    offsets : (m+1,) int64
+        Cell i has the vertices `connectivity[offsets[i]:offsets[i + 1]]`.
+    connectivity : (k,) int64
+
+    Raises
+    ------
+    ReadError
+        The offsets do not fit, or a cell has more or fewer vertices than its type.
+    """
+    sizes = np.diff(offsets)
+    if len(sizes) != len(types) or offsets[0] < 0 or (sizes < 0).any() or offsets[-1] > len(connectivity):
+        raise ReadError("is not a readable VTK file: the offsets of its cells do not fit their vertices")
+    found = []
+    for rows in _same(types, sizes):
+        number, size = int(types[rows[0]]), int(sizes[rows[0]])
+        name, expected = TYPES.get(number, (f"vtk{number}", 0))
+        if expected not in (0, size):
+            raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {size} vertices")
+        at = offsets[rows][:, None] + np.array(_ORDER.get(number, range(size)), dtype=np.int64)
+        found.append(Run(name, rows, connectivity[at]))
+    return found
+
+
+def _same(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> Sequence[NDArray[np.int64]]:
+    """Rows of cells of one type and size, run by run."""
+    rows = np.arange(len(types))
+    starts = _changes(types, sizes)
+    if len(starts) >= _MOST_RUNS:
+        rows = np.lexsort((sizes, types))
+        starts = _changes(types[rows], sizes[rows])
+    return np.split(rows, starts) if len(rows) else []
+
+
+def _changes(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.flatnonzero((np.diff(types) != 0) | (np.diff(sizes) != 0)) + 1

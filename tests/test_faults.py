@@ -1,0 +1,144 @@
+"""Whatever happens while a file is written, the original is whole, and what is left behind is nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import SAMPLES
+from test_cli import run
+
+from meshfix_cli import read, untangle, write
+from meshfix_cli.errors import WriteError
+from meshfix_cli.meshfile.atomic import write_file
+
+POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+WRITES_FOR_EVER = """
+import sys
+from meshfix_cli import read, untangle, write
+document = read(sys.argv[1])
+versions = [document.mesh, untangle(document.mesh).after]
+print("ready", flush=True)
+while True:
+    for mesh in versions:
+        write(document, mesh, sys.argv[1])
+"""
+
+# The command, with a disk that takes its time once the temporary file is written.
+SLOW_DISK = """
+import os, sys, time
+def fsync(fd):
+    print("writing", flush=True)
+    time.sleep(60)
+os.fsync = fsync
+from meshfix_cli.cli import main
+main(sys.argv[1:])
+"""
+
+
+def start(code: str, *arguments: object) -> subprocess.Popen[bytes]:
+    child = subprocess.Popen(
+        [sys.executable, "-c", code, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline().strip() in (b"ready", b"writing")
+    return child
+
+
+@POSIX
+def test_killed_at_twenty_moments_of_writing(tmp_path: Path, random: np.random.Generator) -> None:
+    path = tmp_path / "mesh.vtk"
+    shutil.copy(SAMPLES / "bracket_tangled.vtk", path)
+    document = read(path)
+    write(document, untangle(document.mesh).after, tmp_path / "repaired.vtk")
+    versions = {(SAMPLES / "bracket_tangled.vtk").read_bytes(), (tmp_path / "repaired.vtk").read_bytes()}
+    assert len(versions) == 2
+    for _ in range(20):
+        shutil.copy(SAMPLES / "bracket_tangled.vtk", path)
+        with start(WRITES_FOR_EVER, path) as child:
+            time.sleep(random.uniform(0, 0.05))
+            child.kill()
+        assert path.read_bytes() in versions
+
+
+@POSIX
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_leaves_no_temporary_file(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "mesh.vtk"
+    shutil.copy(SAMPLES / "plate_tangled.vtk", path)
+    original = path.read_bytes()
+    with start(SLOW_DISK, "untangle", "-q", path, path) as child:
+        assert len(list(tmp_path.iterdir())) == 2
+        child.send_signal(getattr(signal, name))
+        _, complaint = child.communicate(timeout=30)
+    assert child.returncode == 128 + getattr(signal, name)
+    assert complaint == b""
+    assert path.read_bytes() == original
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_directory_that_vanishes_is_one_error(tmp_path: Path) -> None:
+    folder = tmp_path / "gone"
+    folder.mkdir()
+
+    def produce(temporary: Path) -> None:
+        temporary.write_bytes(b"mesh")
+        shutil.rmtree(folder)
+
+    with pytest.raises(WriteError, match="No such file or directory"):
+        write_file(str(folder / "mesh.vtk"), produce)
+    assert not folder.exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="limits of POSIX")
+@pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
+def test_a_full_disk_leaves_the_original(share: float, tmp_path: Path) -> None:
+    """The kernel refuses to write beyond a share of the file."""
+    import resource
+
+    path = tmp_path / "mesh.vtk"
+    shutil.copy(SAMPLES / "bracket_tangled.vtk", path)
+    original = path.read_bytes()
+    limit = int(share * len(original))
+    done = subprocess.run(
+        [sys.executable, "-m", "meshfix_cli", "untangle", "-q", "--backup", str(path), str(path)],
+        capture_output=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit)),
+    )
+    assert done.returncode == 1
+    assert done.stderr.count(b"\n") == 1
+    assert b"File too large" in done.stderr
+    assert path.read_bytes() == original
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_backups_never_replace_one_another(tmp_path: Path) -> None:
+    path = tmp_path / "mesh.vtk"
+    shutil.copy(SAMPLES / "plate_tangled.vtk", path)
+    contents = [path.read_bytes()]
+    for strength in ("1h", "2h"):
+        run("perturb", "-q", "--percent", 25, "--dist", strength, "--backup", path, path)
+        contents.append(path.read_bytes())
+    assert (tmp_path / "mesh.vtk.bak").read_bytes() == contents[0]
+    assert (tmp_path / "mesh.vtk.bak1").read_bytes() == contents[1]
+    assert len(set(contents)) == 3
+    run("untangle", "-q", "--backup", path, tmp_path / "new.vtk")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["mesh.vtk", "mesh.vtk.bak", "mesh.vtk.bak1", "new.vtk"]
+
+
+@pytest.mark.parametrize("name", ["plate_tangled.vtk", "bracket_tangled.vtk", "two_materials.msh", "plate_tangled.obj"])
+def test_a_second_run_changes_no_byte(name: str, tmp_path: Path) -> None:
+    once, twice = tmp_path / f"once_{name}", tmp_path / f"twice_{name}"
+    run("untangle", "-q", SAMPLES / name, once)
+    done = run("untangle", once, twice)
+    assert twice.read_bytes() == once.read_bytes()
+    assert b"nothing was moved" in done.stdout

@@ -206,6 +206,8 @@ FILES: dict[str, Callable[[Path], None]] = {
     "groups_binary_4.msh": partial(by_gmsh, boxes, **BINARY_4),
     "all_text_4.msh": partial(by_gmsh, plates, SaveAll=1, **TEXT_4),
     "all_binary_4.msh": partial(by_gmsh, boxes, SaveAll=1, **BINARY_4),
+    "parametric_text_2.msh": partial(by_gmsh, plates, SaveParametric=1, **TEXT_2),
+    "parametric_binary_2.msh": partial(by_gmsh, boxes, SaveParametric=1, **BINARY_2),
     "parametric_text_4.msh": partial(by_gmsh, plates, SaveParametric=1, **TEXT_4),
     "parametric_binary_4.msh": partial(by_gmsh, boxes, SaveParametric=1, **BINARY_4),
     "periodic_binary_2.msh": partial(by_gmsh, periodic_box, **BINARY_2),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from meshfix_cli import _kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.splice import Places
-from meshfix_cli.meshfile.text import integers, integers_at, words
+from meshfix_cli.meshfile.text import integers, integers_at, line_words, words
 
 Int64 = NDArray[np.int64]
 
@@ -87,6 +88,17 @@ class Text(Numbers):
         spans = self._words(count, 1 + width)
         return integers_at(self.data, spans[:, 0]), Places.of_text(spans[:, 1:])
 
+    def parametric(self, count: int) -> tuple[Int64, Places]:
+        """Go over lines of a tag, three coordinates and what comes behind: the tags, and the places of the three."""
+        self.claim(count, 8)
+        ends = self.at + np.flatnonzero(np.frombuffer(self.data, np.uint8, offset=self.at) == ord("\n"))[:count]
+        starts = np.array([self.at, *(ends[:-1] + 1)])
+        spans = line_words(self.data, starts, 4)
+        if len(ends) < count or (spans < 0).any():
+            raise ReadError("is truncated or damaged: $ParametricNodes has not a line of numbers for each node")
+        self.at = int(ends[-1])
+        return integers_at(self.data, spans[:, 0]), Places.of_text(spans[:, 1:])
+
     def corners(self, base: int, first: Int64, count: int, kind: str) -> Places:
         """Places (m, count) of integers: how many others stand from the offset `base` to the `first` (m,) of a row."""
         spans = words(self.data, base, int(first.max()) + count)
@@ -138,6 +150,19 @@ class Binary(Numbers):
         first = self._rows(count, 4 + 8 * width)
         tags = Places.of_rows(first, 1, self.order + "i4").read(self.data)[:, 0]
         return tags.astype(np.int64), Places.of_rows(first + 4, width, self.order + "f8")
+
+    def parametric(self, count: int) -> tuple[Int64, Places]:
+        """Go over a tag, three coordinates, dimension, entity, parameters: the tags, and the places of the three."""
+        self.claim(count, 36)
+        first, dimension = [], struct.Struct(self.order + "i")
+        for _ in range(count):
+            self.claim(1, 36)
+            first.append(self.at)
+            parameters = {1: 1, 2: 2}.get(dimension.unpack_from(self.data, self.at + 28)[0], 0)
+            self.at += 36 + 8 * parameters
+        at = np.array(first, dtype=np.int64)
+        tags = Places.of_rows(at, 1, self.order + "i4").read(self.data)[:, 0]
+        return tags.astype(np.int64), Places.of_rows(at + 4, 3, self.order + "f8")
 
     def corners(self, base: int, first: Int64, count: int, kind: str) -> Places:
         """Places (m, count) of integers: how many others stand from the offset `base` to the `first` (m,) of a row."""

@@ -145,9 +145,10 @@ def _nodes_2(numbers: Numbers, file: File) -> None:
 
 
 def _parametric_nodes_2(numbers: Numbers, file: File) -> None:
-    raise ReadError(
-        "has $ParametricNodes, which cannot be read: save it without Mesh.SaveParametric, or as version 4.1"
-    )
+    """Read their number, and for each tag, x, y, z, dimension and entity, and one parameter on curves, two on faces."""
+    tags, places = numbers.parametric(numbers.count())
+    file.tags.append(tags)
+    file.coordinates.append(places)
 
 
 def _nodes_4(numbers: Numbers, file: File) -> None:

@@ -78,7 +78,8 @@ class _Facets:
         places = replace(self.normals, begin=self.normals.begin[facets], end=end)
         values = _normals(corners)
         try:
-            wrong = ~(np.abs(places.read(self.data) - values) <= _RIGHT)
+            with np.errstate(invalid="ignore"):
+                wrong = ~(np.abs(places.read(self.data) - values) <= _RIGHT)
         except ReadError:  # "-nan(ind)" and the like
             wrong = np.ones(values.shape, dtype=bool)
         return places.replace(wrong, values)

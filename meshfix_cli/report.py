@@ -261,14 +261,14 @@ def _verdict(report: Report) -> list[str]:
         verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
         text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
         lines.append(text + (f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"))
-        lines += [f"  cell {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
+        lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
         if report.stuck:
             lines.append(f"{report.stuck:,} of them without a free vertex: the fixed ones are wrong")
     if report.misnumbered:
         first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[: report.listed]].tolist()
         some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > len(first) else "")
         what = "element is" if report.misnumbered == 1 else "elements are"
-        text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (cell {some})"
+        text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (element {some})"
         lines.append(f"{text}; untangle --fix-orientation renumbers them")
     return lines
 

@@ -89,7 +89,7 @@ def test_json_has_a_schema_and_the_facts_of_the_table(tmp_path: Path) -> None:
 def test_quality_of_a_tangled_mesh_names_the_first_ten_and_exits_3() -> None:
     text = run("quality", TANGLED, code=3).stdout.decode()
     assert "NOT VALID: 89 elements are inverted; the first 10:" in text
-    assert text.count("  cell ") == 10
+    assert text.count("  element ") == 10
     facts = json.loads(run("quality", "--json", TANGLED, code=3).stdout)
     first = facts["first_inverted"][0]
     mesh = meshio.read(TANGLED)
@@ -109,7 +109,7 @@ def test_elements_numbered_against_their_neighbours_are_not_called_valid(tmp_pat
     mesh.cells[0].data[3] = mesh.cells[0].data[3][::-1]
     mesh.write(tmp_path / "in.vtk")
     text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
-    assert "NOT VALID: 1 element is numbered against the rest of the mesh (cell 3)" in text
+    assert "NOT VALID: 1 element is numbered against the rest of the mesh (element 3)" in text
 
 
 def test_quiet_dry_run_and_history(tmp_path: Path) -> None:
@@ -244,8 +244,8 @@ def test_cells_need_a_format_that_holds_them(tmp_path: Path) -> None:
 
 def test_all_lists_every_inverted_element() -> None:
     inverted = read(TANGLED).mesh.check()[0]
-    assert run("quality", TANGLED, code=3).stdout.decode().count("  cell ") == 10
-    assert run("quality", "--all", TANGLED, code=3).stdout.decode().count("  cell ") == inverted
+    assert run("quality", TANGLED, code=3).stdout.decode().count("  element ") == 10
+    assert run("quality", "--all", TANGLED, code=3).stdout.decode().count("  element ") == inverted
     facts = json.loads(run("quality", "--all", "--json", TANGLED, code=3).stdout)
     assert len(facts["first_inverted"]) == inverted
 
@@ -284,7 +284,7 @@ def test_orientation_is_mended_where_asked(tmp_path: Path) -> None:
     mesh.cells[0].data[3] = mesh.cells[0].data[3][::-1]
     mesh.write(tmp_path / "in.vtk", file_format="vtk42", binary=False)
     text = run("quality", tmp_path / "in.vtk", code=3).stdout.decode()
-    assert "NOT VALID: 1 element is numbered against the rest of the mesh (cell 3)" in text
+    assert "NOT VALID: 1 element is numbered against the rest of the mesh (element 3)" in text
     assert "--fix-orientation renumbers them" in text
     text = run("untangle", "--fix-orientation", tmp_path / "in.vtk", tmp_path / "out.vtk").stdout.decode()
     assert "note: renumbered 1 triangle" in text

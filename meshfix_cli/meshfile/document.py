@@ -193,7 +193,8 @@ def _reversed(simplices: NDArray[np.int64], topology: Topology) -> NDArray[np.bo
 def _solved_points(
     source: Source, simplices: NDArray[np.int64], dimension: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
-    points = np.asarray(source.points, dtype=np.float64)
+    with np.errstate(invalid="ignore"):  # a signalling NaN; Mesh.build tells where there is any
+        points = np.asarray(source.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or points.shape[1] < dimension:
         raise ReadError(f"its points have {points.shape[-1]} coordinates")
     if points.shape[1] == dimension:

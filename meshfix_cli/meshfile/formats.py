@@ -53,7 +53,7 @@ def sniff(data: bytes) -> Format | None:
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
     if text.startswith("ply"):
         return Format("ply", "format ascii" not in text)
-    if text.startswith("solid") and "facet" in text:
+    if re.match(r"solid\b.*\bfacet\b", text, re.IGNORECASE | re.DOTALL):
         return Format("stl", False)
     if re.match(r"(#.*\s+)*MeshVersionFormatted\b", text):
         return Format("medit")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from meshfix_cli import _kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.splice import Places
-from meshfix_cli.meshfile.text import integers, integers_at, line_words, words
+from meshfix_cli.meshfile.text import in_line, integers, integers_at, line_words, words
 
 Int64 = NDArray[np.int64]
 
@@ -47,8 +47,7 @@ class Numbers:
         """Read an integer in text and, if it is there, the end of its line."""
         match = _COUNT.match(self.data, self.at)
         if match is None:
-            line = self.data.count(b"\n", 0, self.at) + 1
-            raise ReadError(f"line {line}: there is no number of what follows")
+            raise in_line(self.data, self.at, "there is no number of what follows")
         self.at = match.end()
         return int(match[1])
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.text import Spans, integers_at, line_words
+from meshfix_cli.meshfile.text import Spans, first_words, in_line, integers_at, line_words
 
 _CONTINUED = re.compile(rb"\\[ \t]*[\r\n]")
 _COMMA = re.compile(rb"(?:^|[\r\n])[ \t]*[vflp]\b[^\r\n#]*(,)")  # no part of a number, but the kernels end words there
@@ -54,26 +54,6 @@ def parse(data: bytes) -> Source | None:
             corners.append(partial(Places.of_text, spans, "i8"))
     untold = _untold(data, coordinates, set(np.unique(keywords).tolist()))
     return Source(coordinates.read(data), cells, InPlace(data, coordinates, corners), untold=untold)
-
-
-def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:
-    """Return the offset behind the first word of each line that has one, and the words, cut after nine bytes."""
-    raw = np.frombuffer(data, dtype=np.uint8)
-    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0  # the mark of UTF-8
-    lines = np.concatenate([[start], np.flatnonzero((raw == ord("\n")) | (raw == ord("\r"))) + 1])
-    spans = line_words(data, lines, 1)[:, 0]
-    begin, end = spans[spans[:, 0] >= 0].T
-    words = np.zeros((len(begin), 9), dtype=np.uint8)
-    for i in range(9):
-        inside = begin + i < end
-        words[inside, i] = raw[begin[inside] + i]
-    return end, words.view("S9")[:, 0]
-
-
-def in_line(data: bytes, at: int, what: str) -> ReadError:
-    """Return the error that tells what is wrong at an offset."""
-    number = data.count(b"\n", 0, at) + 1
-    return ReadError(f"line {number}: {what}")
 
 
 def _coordinates(data: bytes, at: NDArray[np.int64]) -> Spans:

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 
 from meshfix_cli import _kernels
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.obj import in_line
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply
-from meshfix_cli.meshfile.text import integers_at, numbers_at
+from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 
 _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r|\Z)")
 _LINE = re.compile(rb"[^\r\n]+")

@@ -76,12 +76,24 @@ class Places:
         """Return the numbers (n, k) in the machine's byte order; ReadError where there are none."""
         if self.end is not None:
             return numbers_at(data, self.spans, self.dtype)
-        size = self.dtype.itemsize
+        size, native = self.dtype.itemsize, self.dtype.newbyteorder("=")
         if self.begin.size and not 0 <= self.begin.min() <= self.begin.max() <= len(data) - size:
             raise ReadError("is truncated: its numbers reach behind its end")
+        stride = self._stride()
+        if stride:
+            strides = (stride, size)
+            return np.ndarray(self.begin.shape, self.dtype, data, int(self.begin[0, 0]), strides).astype(native)
         cells = self.begin.reshape(-1, 1) + np.arange(size)
         values = np.frombuffer(data, dtype=np.uint8)[cells].view(self.dtype).reshape(self.begin.shape)
-        return values.astype(self.dtype.newbyteorder("="))
+        return values.astype(native)
+
+    def _stride(self) -> int:
+        """Bytes from a row to the next where all rows are alike and without gaps, else 0: a view needs no index."""
+        if self.begin.ndim != 2 or len(self.begin) < 2:
+            return 0
+        step = int(self.begin[1, 0] - self.begin[0, 0])
+        alike = (np.diff(self.begin[:, 0]) == step).all() and (np.diff(self.begin, axis=1) == self.dtype.itemsize).all()
+        return step if alike and step > 0 else 0
 
     def rounded(self, values: Points) -> Points:
         """Return numbers (n, k) as the file can hold them."""

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.obj import first_words, in_line
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, Places, Points, apply, differing
-from meshfix_cli.meshfile.text import Spans, line_words
+from meshfix_cli.meshfile.text import Spans, first_words, in_line, line_words
 
 _SOLID = re.compile(rb"(?:\xef\xbb\xbf)?\s*solid\b", re.IGNORECASE)
 _FACET = np.array([b"facet", b"vertex", b"vertex", b"vertex", b"endfacet"])

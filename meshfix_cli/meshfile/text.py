@@ -23,7 +23,7 @@ def words(data: bytes, at: int, count: int) -> Spans:
     """
     spans = _kernels.find_words(data, np.array([at], dtype=np.int64), count, False)
     if len(spans) < count:
-        raise ReadError(f"is truncated: {count:,} numbers are announced in line {_line(data, at)}")
+        raise in_line(data, at, f"{count:,} numbers are announced, and the file is truncated")
     return spans
 
 
@@ -31,6 +31,20 @@ def line_words(data: bytes, offsets: ArrayLike, count: int) -> Spans:
     """Return the spans (k, count, 2) of the first words from each offset (k,) to the end of its line; -1: none."""
     at = np.ascontiguousarray(offsets, dtype=np.int64)
     return _kernels.find_words(data, at, count, True).reshape(len(at), count, 2)
+
+
+def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:
+    """Return the offset behind the first word of each line that has one, and the words, cut after nine bytes."""
+    raw = np.frombuffer(data, dtype=np.uint8)
+    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0  # the mark of UTF-8
+    lines = np.concatenate([[start], np.flatnonzero((raw == ord("\n")) | (raw == ord("\r"))) + 1])
+    spans = line_words(data, lines, 1)[:, 0]
+    begin, end = spans[spans[:, 0] >= 0].T
+    found = np.zeros((len(begin), 9), dtype=np.uint8)
+    for i in range(9):
+        inside = begin + i < end
+        found[inside, i] = raw[begin[inside] + i]
+    return end, found.view("S9")[:, 0]
 
 
 def integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int64], int]:
@@ -59,12 +73,14 @@ def numbers_at(data: bytes, spans: Spans, dtype: np.dtype[Any]) -> NDArray[np.fl
     return values.reshape(spans.shape[:-1]).astype(dtype, copy=False)
 
 
+def in_line(data: bytes, at: int, what: str) -> ReadError:
+    """Return the error that tells what is wrong at an offset."""
+    number = data.count(b"\n", 0, at) + 1
+    return ReadError(f"line {number}: {what}")
+
+
 def _not_a_number(data: bytes, at: int, what: str) -> ReadError:
     if not 0 <= at < len(data):
         return ReadError("is truncated: a number is missing" + (" at its end" if at >= len(data) else ""))
     word = data[at : at + 40].replace(b",", b" ").split(maxsplit=1)[0].decode("latin-1")
-    return ReadError(f"line {_line(data, at)}: {word!r} is not {what}")
-
-
-def _line(data: bytes, at: int) -> int:
-    return data.count(b"\n", 0, at) + 1
+    return in_line(data, at, f"{word!r} is not {what}")

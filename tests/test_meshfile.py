@@ -247,6 +247,59 @@ def test_other_formats_by_extension(tmp_path: Path, plate: Mesh, suffix: str) ->
         assert after.format.name == "gmsh22"  # never meshio's default of ANSYS
 
 
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".mesh"])
+def test_conversions_keep_the_materials(tmp_path: Path, suffix: str) -> None:
+    document = read(SAMPLES / "two_materials.msh")
+    _, dropped = write(document, untangle(document.mesh).after, tmp_path / f"out{suffix}")
+    assert dropped == ("group steel", "group copper", "comments")
+    after = read(tmp_path / f"out{suffix}")
+    np.testing.assert_array_equal(after.mesh.movable, document.mesh.movable)
+    assert sorted(after.fixed.values()) == sorted(document.fixed.values())
+
+
+def test_materials_become_sets_and_sets_materials(tmp_path: Path) -> None:
+    document = read(SAMPLES / "two_materials.msh")
+    labels = document.source.arrays.cell["gmsh:physical"][0]
+    write(document, document.mesh, tmp_path / "out.inp")
+    text = (tmp_path / "out.inp").read_text()
+    sections = "*SOLID SECTION, ELSET=steel, MATERIAL=S\n*SOLID SECTION, ELSET=copper, MATERIAL=C\n"
+    (tmp_path / "out.inp").write_text(text + sections)
+    deck = read(tmp_path / "out.inp")
+    np.testing.assert_array_equal(np.concatenate(deck.source.arrays.cell["abaqus:section"]), labels)
+    _, dropped = write(deck, deck.mesh, tmp_path / "back.msh")
+    assert "keywords *HEADING, *SOLID SECTION" in dropped
+    back = read(tmp_path / "back.msh")
+    np.testing.assert_array_equal(np.concatenate(back.source.arrays.cell["gmsh:physical"]), labels)
+    np.testing.assert_array_equal(back.mesh.movable, document.mesh.movable)
+
+
+def test_a_converted_file_has_one_run_for_each_type(tmp_path: Path, bracket: Mesh) -> None:
+    """Programs that read MEDIT files take the last of several lists of one kind."""
+    tets, label = bracket.topology.simplices, np.arange(len(bracket.topology.simplices)) % 3
+    cells = [("tetra", tets[:100]), ("triangle", tets[:5, :3]), ("tetra", tets[100:])]
+    data = {"label": [label[:100], label[:5] + 7, label[100:]], "vector": [np.ones((len(c), 3)) for _, c in cells]}
+    meshio.Mesh(bracket.points, cells, cell_data=data).write(tmp_path / "in.vtk")
+    document = read(tmp_path / "in.vtk", regions="label")
+    _, dropped = write(document, document.mesh, tmp_path / "out.mesh")
+    assert (tmp_path / "out.mesh").read_text().count("Tetrahedra") == 1
+    assert dropped == ("cell data vector",)
+    after = read(tmp_path / "out.mesh")
+    np.testing.assert_array_equal(after.mesh.topology.simplices, document.mesh.topology.simplices)
+    np.testing.assert_array_equal(after.source.arrays.cell["medit:ref"][0], label)
+
+
+def test_what_a_format_cannot_hold_is_named(tmp_path: Path) -> None:
+    document = read(SAMPLES / "plate_tangled.obj")
+    assert write(document, document.mesh, tmp_path / "out.off")[1] == ("comments", "objects and groups")
+    points = np.column_stack([document.mesh.points, np.zeros(document.mesh.topology.n)])
+    cells = [("triangle", document.simplices), ("line", [[0, 1]]), ("vertex", [[3]])]
+    meshio.Mesh(points, cells, point_data={"a b": points[:, 0]}).write(tmp_path / "in.vtu")
+    rich = read(tmp_path / "in.vtu")
+    lost = ("line cells", "vertex cells", "point data a b", "comments")
+    assert write(rich, rich.mesh, tmp_path / "out.obj")[1] == lost
+    assert write(rich, rich.mesh, tmp_path / "out.vtk")[1] == lost[-1:]
+
+
 def test_msh_keeps_its_version(tmp_path: Path) -> None:
     document = read(SAMPLES / "two_materials.msh")
     assert output_format(document, str(tmp_path / "x.msh")).name == "gmsh22"

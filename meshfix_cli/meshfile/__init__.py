@@ -116,7 +116,7 @@ def write(
     def produce(temporary: Path) -> None:
         nonlocal stored, dropped
         try:
-            held, dropped = _write_anew(temporary, source, points, form, mesh.dimension)
+            held, dropped = _write_anew(temporary, source.merged(), points, form, mesh.dimension)
         except WriteError as error:
             raise WriteError(f"{target}: {error}") from error
         stored = document.in_plane(held, mesh)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Any, Protocol
 
 import numpy as np
@@ -122,6 +123,26 @@ class Source:
         runs = [run.vertices for run in self.cells if run.type == kind]
         return np.concatenate(runs or [np.empty((0, corners), dtype=np.int64)])
 
+    def merged(self) -> Source:
+        """Return the same with one run for all cells of a type: some programs read no more than one of each."""
+        alike: dict[tuple[str, int], list[int]] = {}
+        for i, run in enumerate(self.cells):
+            width = run.vertices.shape[1] if isinstance(run.vertices, np.ndarray) else -1 - i
+            alike.setdefault((run.type, width), []).append(i)
+        groups, mine = list(alike.values()), self.arrays
+        cells = [Cells(kind, _joined([self.cells[i].vertices for i in runs])) for (kind, _), runs in alike.items()]
+        cell = {name: [_joined([values[i] for i in runs]) for runs in groups] for name, values in mine.cell.items()}
+        sets = {}
+        for name, rows in mine.cell_sets.items():
+            parts = ([rows[i] + start for i, start in zip(runs, self._starts(runs), strict=True)] for runs in groups)
+            sets[name] = [_joined(part) for part in parts]
+        arrays = replace(mine, cell=cell, cell_sets=sets)
+        return replace(self, cells=cells, load=lambda: arrays)
+
+    def _starts(self, runs: Sequence[int]) -> list[int]:
+        """How many cells stand before each of some runs when these are joined."""
+        return [0, *accumulate(len(self.cells[i].vertices) for i in runs[:-1])]
+
     def lost_in(self, other: Source) -> tuple[str, ...]:
         """Name what another source, written from this one, does not hold."""
         mine, theirs = self.arrays, other.arrays
@@ -133,9 +154,13 @@ class Source:
         for name, runs in mine.cell.items():
             if not _is_among(np.concatenate(runs), found):
                 lost.append(f"cell data {name}")
-        for kind in ("groups", "point_sets", "cell_sets"):
-            lost += [f"group {name}" for name in getattr(mine, kind) if name not in getattr(theirs, kind)]
+        held = {*theirs.groups, *theirs.point_sets, *theirs.cell_sets}
+        lost += [f"group {name}" for name in (*mine.groups, *mine.point_sets, *mine.cell_sets) if name not in held]
         return (*dict.fromkeys(lost), *self.untold)
+
+
+def _joined(parts: Sequence[Any]) -> Any:
+    return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _is_among(values: Any, found: Sequence[NDArray[Any]]) -> bool:

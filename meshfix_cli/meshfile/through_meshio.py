@@ -21,6 +21,7 @@ from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset({"line", "triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"})
+_MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _SPATIAL = ("obj", "off", "ply", "stl")  # these have no plane meshes
 
 
@@ -57,9 +58,20 @@ def write_path(path: Path, source: Source, points: NDArray[np.floating[Any]], fo
 
 
 def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kept: list[int], form: Format) -> Any:
+    """The kept runs of cells; what tells materials apart goes where the format has it."""
+
     def name(text: str) -> str:
+        if text in source.regions:
+            text = _MATERIALS.get(form.reader, text)
         return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
 
+    cell_sets = dict(arrays.cell_sets)
+    if form.name == "abaqus":
+        titles = {int(number): title for title, (number, _) in arrays.groups.items()}
+        for region in set(source.regions) & set(arrays.cell):
+            for label in np.unique(np.concatenate(arrays.cell[region])).tolist():
+                rows = [np.flatnonzero(values == label) for values in arrays.cell[region]]
+                cell_sets.setdefault(titles.get(label, f"REGION_{label}"), rows)
     return meshio.Mesh(
         points,
         [(source.cells[i].type, source.cells[i].vertices) for i in kept],
@@ -67,7 +79,7 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
         cell_data={name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()},
         field_data=dict(arrays.groups),
         point_sets=dict(arrays.point_sets),
-        cell_sets={key: [runs[i] for i in kept] for key, runs in arrays.cell_sets.items()},
+        cell_sets={key: [runs[i] for i in kept] for key, runs in cell_sets.items()},
     )
 
 
@@ -80,7 +92,10 @@ def _source(mesh: Any) -> Source:
         cell=cell,
         groups=mesh.field_data,
         point_sets=mesh.point_sets,
-        cell_sets=mesh.cell_sets,
+        cell_sets={
+            name: [np.array([] if rows is None else rows, dtype=np.int64) for rows in runs]
+            for name, runs in mesh.cell_sets.items()
+        },
     )
     return Source(
         points if points.dtype.kind == "f" else points.astype(np.float64),

@@ -3,36 +3,20 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import shapes
 from numpy.typing import NDArray
+from programs import gmsh_session
 
 from meshfix_cli.mesh import Mesh
 from meshfix_cli.perturb import perturb
 
 TYPES = {2: 2, 3: 4}  # of gmsh's simplices
-
-
-@contextmanager
-def gmsh_session(**options: float) -> Iterator[Any]:
-    """gmsh without a word, and with some options of `Mesh`."""
-    gmsh = pytest.importorskip("gmsh")
-    gmsh.initialize(readConfigFiles=False, interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("General.NumThreads", 1)
-        for name, value in options.items():
-            gmsh.option.setNumber(f"Mesh.{name}", value)
-        yield gmsh
-    finally:
-        gmsh.finalize()
 
 
 def boxes(gmsh: Any) -> None:

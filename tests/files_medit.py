@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 import shapes
 from numpy.typing import NDArray
+from programs import gmsh_session
 
 from meshfix_cli.mesh import Mesh
 
@@ -58,12 +58,8 @@ def gmsh_plane(path: Path) -> None:
 
 def write_with_gmsh(path: Path, points: NDArray[np.float64], cells: NDArray[np.int64]) -> None:
     """Simplices and their boundary, as two entities, in any format that gmsh writes."""
-    module = pytest.importorskip("gmsh")
     d = cells.shape[1] - 1
-    module.initialize(interruptible=False)
-    try:
-        module.option.setNumber("General.Terminal", 0)
-        module.option.setNumber("Mesh.SaveAll", 1)
+    with gmsh_session(SaveAll=1) as module:
         for dimension, simplices in ((d - 1, surface(cells)), (d, cells)):
             tag = module.model.addDiscreteEntity(dimension)
             if dimension == d - 1:
@@ -71,8 +67,6 @@ def write_with_gmsh(path: Path, points: NDArray[np.float64], cells: NDArray[np.i
             kind = {1: 1, 2: 2, 3: 4}[dimension]
             module.model.mesh.addElementsByType(tag, kind, [], (simplices + 1).ravel())
         module.write(str(path))
-    finally:
-        module.finalize()
 
 
 def meshio(path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,9 @@ import numpy as np
 import pytest
 import shapes
 from numpy.typing import NDArray
+from programs import vtk_writes_surface
 
 BESIDE = np.array([[3.5, 0.0, 0.0], [4.5, 0.0, 0.0], [4.5, 1.0, 0.0], [4.0, 1.5, 0.0], [3.5, 1.0, 0.0]])
-TILTED = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])  # a rotation
 
 
 def lines_of(points: NDArray[np.float64], ending: str = "") -> list[str]:
@@ -84,27 +85,6 @@ def trimesh_writes(path: Path) -> None:
     mesh.export(path, include_normals=True)
 
 
-def vtk_writes(path: Path) -> None:
-    """A skew plane, in single precision."""
-    pytest.importorskip("vtk")
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkIOGeometry import vtkOBJWriter
-
-    points, cells = shapes.plate()
-    mesh, vtk_points, triangles = vtkPolyData(), vtkPoints(), vtkCellArray()
-    vtk_points.SetData(numpy_to_vtk((points @ TILTED).astype(np.float32), deep=True))
-    for cell in cells.tolist():
-        triangles.InsertNextCell(3, cell)
-    mesh.SetPoints(vtk_points)
-    mesh.SetPolys(triangles)
-    writer = vtkOBJWriter()
-    writer.SetFileName(str(path))
-    writer.SetInputData(mesh)
-    writer.Write()
-
-
 FILES: dict[str, Callable[[Path], None]] = {
     "blender.obj": blender,
     "meshlab.obj": meshlab,
@@ -113,7 +93,7 @@ FILES: dict[str, Callable[[Path], None]] = {
     "lines_and_points.obj": lines_and_points,
     "windows.obj": windows,
     "trimesh.obj": trimesh_writes,
-    "vtk_skew.obj": vtk_writes,
+    "vtk_skew.obj": partial(vtk_writes_surface, module="vtkIOGeometry", writer="vtkOBJWriter"),
 }
 
 

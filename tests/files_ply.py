@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 import shapes
-from files_obj import BESIDE, TILTED
+from files_obj import BESIDE
 from numpy.typing import NDArray
+from programs import vtk_writes_surface
 
 CODES = {"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f", "double": "d"}
 ALIASES = {"int8": "char", "uint8": "uchar", "int16": "short", "uint16": "ushort", "int32": "int", "uint32": "uint",
@@ -105,28 +106,6 @@ def trimesh_writes(path: Path, encoding: str) -> None:
     path.write_bytes(trimesh.exchange.ply.export_ply(mesh, encoding=encoding, vertex_normal=True))
 
 
-def vtk_writes(path: Path, binary: bool) -> None:
-    """A skew plane."""
-    pytest.importorskip("vtk")
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkIOPLY import vtkPLYWriter
-
-    points, cells = shapes.plate()
-    mesh, vtk_points, triangles = vtkPolyData(), vtkPoints(), vtkCellArray()
-    vtk_points.SetData(numpy_to_vtk((points @ TILTED).astype(np.float32), deep=True))
-    for cell in cells.tolist():
-        triangles.InsertNextCell(3, cell)
-    mesh.SetPoints(vtk_points)
-    mesh.SetPolys(triangles)
-    writer = vtkPLYWriter()
-    writer.SetFileName(str(path))
-    writer.SetInputData(mesh)
-    (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()
-    writer.Write()
-
-
 FILES: dict[str, Callable[[Path], None]] = {
     "meshlab_text.ply": partial(meshlab, order=""),
     "meshlab_binary.ply": partial(meshlab, order="<"),
@@ -136,8 +115,8 @@ FILES: dict[str, Callable[[Path], None]] = {
     "mixed_big_cr.ply": partial(mixed, order=">", end="\r"),
     "trimesh_binary.ply": partial(trimesh_writes, encoding="binary"),
     "trimesh_text.ply": partial(trimesh_writes, encoding="ascii"),
-    "vtk_skew_text.ply": partial(vtk_writes, binary=False),
-    "vtk_skew_binary.ply": partial(vtk_writes, binary=True),
+    "vtk_skew_text.ply": partial(vtk_writes_surface, module="vtkIOPLY", writer="vtkPLYWriter", binary=False),
+    "vtk_skew_binary.ply": partial(vtk_writes_surface, module="vtkIOPLY", writer="vtkPLYWriter", binary=True),
 }
 
 

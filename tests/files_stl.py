@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 import shapes
-from files_obj import TILTED
 from numpy.typing import NDArray
+from programs import gmsh_session, vtk_writes_surface
 
 REPEATED = 20  # at most: a coordinate at the corners of its facets, and the normals of these
 BINARY = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -66,40 +66,12 @@ def trimesh_writes(path: Path, form: str) -> None:
 
 
 def gmsh_writes(path: Path, binary: bool) -> None:
-    gmsh = pytest.importorskip("gmsh")
     points, cells = shapes.plate()
-    gmsh.initialize(interruptible=False)
-    try:
-        gmsh.option.setNumber("General.Terminal", 0)
-        gmsh.option.setNumber("Mesh.Binary", int(binary))
+    with gmsh_session(Binary=int(binary)) as gmsh:
         gmsh.model.addDiscreteEntity(2, 1)
         gmsh.model.mesh.addNodes(2, 1, np.arange(1, len(points) + 1), points.ravel())
         gmsh.model.mesh.addElementsByType(1, 2, [], (cells + 1).ravel())
         gmsh.write(str(path))
-    finally:
-        gmsh.finalize()
-
-
-def vtk_writes(path: Path, binary: bool) -> None:
-    """A skew plane."""
-    pytest.importorskip("vtk")
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkIOGeometry import vtkSTLWriter
-
-    points, cells = shapes.plate()
-    mesh, vtk_points, triangles = vtkPolyData(), vtkPoints(), vtkCellArray()
-    vtk_points.SetData(numpy_to_vtk((points @ TILTED).astype(np.float32), deep=True))
-    for cell in cells.tolist():
-        triangles.InsertNextCell(3, cell)
-    mesh.SetPoints(vtk_points)
-    mesh.SetPolys(triangles)
-    writer = vtkSTLWriter()
-    writer.SetFileName(str(path))
-    writer.SetInputData(mesh)
-    (writer.SetFileTypeToBinary if binary else writer.SetFileTypeToASCII)()
-    writer.Write()
 
 
 FILES: dict[str, Callable[[Path], None]] = {
@@ -110,8 +82,8 @@ FILES: dict[str, Callable[[Path], None]] = {
     "trimesh_binary.stl": partial(trimesh_writes, form="stl"),
     "gmsh_text.stl": partial(gmsh_writes, binary=False),
     "gmsh_binary.stl": partial(gmsh_writes, binary=True),
-    "vtk_skew_text.stl": partial(vtk_writes, binary=False),
-    "vtk_skew_binary.stl": partial(vtk_writes, binary=True),
+    "vtk_skew_text.stl": partial(vtk_writes_surface, module="vtkIOGeometry", writer="vtkSTLWriter", binary=False),
+    "vtk_skew_binary.stl": partial(vtk_writes_surface, module="vtkIOGeometry", writer="vtkSTLWriter", binary=True),
 }
 
 

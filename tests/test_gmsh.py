@@ -11,6 +11,7 @@ from typing import Any
 import files_gmsh
 import numpy as np
 import pytest
+from programs import gmsh_session
 
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
@@ -325,7 +326,7 @@ def test_types_are_those_of_gmsh_and_meshio() -> None:
         kind: (name, num_nodes_per_cell[name]) for kind, name in _gmsh_to_meshio_type.items()
     }
     assert len({name for name, _ in TYPES.values()}) == len(TYPES)
-    with files_gmsh.gmsh_session() as module:
+    with gmsh_session() as module:
         for kind in {*range(1, 34), 92, 93}:
             family, _, _, size, *_ = module.model.mesh.getElementProperties(kind)
             assert TYPES[kind][1] == size
@@ -358,7 +359,7 @@ def test_nodes_of_curved_cells_come_in_the_order_of_vtk(
     name: str, kind: int, corners: list[int], tmp_path: Path
 ) -> None:
     """gmsh makes them of straight cells: each lies in the middle of some corners."""
-    with files_gmsh.gmsh_session(SecondOrderIncomplete=name != "hexahedron27", MshFileVersion=4.1) as module:
+    with gmsh_session(SecondOrderIncomplete=name != "hexahedron27", MshFileVersion=4.1) as module:
         module.model.addDiscreteEntity(3, 1)
         module.model.mesh.addNodes(3, 1, np.arange(1, len(corners) + 1), np.array(CUBE)[corners].ravel())
         module.model.mesh.addElementsByType(1, kind, [1], np.arange(1, len(corners) + 1))

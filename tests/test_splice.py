@@ -15,9 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import SAMPLES
+from test_cli import run
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.meshfile import Document
+from meshfix_cli.meshfile.formats import sniff
 
 FORMATS = ("gmsh", "vtk", "vtu", "obj", "abaqus", "medit", "ply", "stl")
 MODULES = {name: importlib.import_module(f"files_{name}") for name in FORMATS}
@@ -113,6 +115,21 @@ def test_a_mesh_that_did_not_move_is_the_same_file(form: str, variant: str, tmp_
     document = read(path)
     write(document, document.mesh, tmp_path / "out")
     assert (tmp_path / "out").read_bytes() == path.read_bytes()
+
+
+@table
+def test_a_stream_is_recognised_by_its_first_bytes(form: str, variant: str, tmp_path: Path) -> None:
+    found = sniff(make(form, variant, tmp_path).read_bytes())
+    assert found is not None
+    assert found.reader == form
+
+
+@pytest.mark.parametrize("form", FORMATS)
+def test_a_stream_works_like_a_file(form: str, tmp_path: Path) -> None:
+    path = make(form, next(iter(MODULES[form].FILES)), tmp_path)
+    run("untangle", "-q", path, tmp_path / f"out{path.suffix}")
+    streamed = run("untangle", "-q", data=path.read_bytes())
+    assert streamed.stdout == (tmp_path / f"out{path.suffix}").read_bytes()
 
 
 @table

@@ -48,7 +48,7 @@ def sniff(data: bytes) -> Format | None:
         fields = text.split("$MeshFormat", 1)[1].split()
         return Format("gmsh22" if fields[:1] and fields[0].startswith("2") else "gmsh", fields[1:2] == ["1"])
     if text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin")):
-        if "<VTKFile" in text:
+        if re.search(r"<VTKFile[^>]*\stype\s*=\s*[\"']UnstructuredGrid", text):
             return Format("vtu", 'format="ascii"' not in text)
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
     if text.startswith("ply"):

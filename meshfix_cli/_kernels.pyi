@@ -75,8 +75,8 @@ def find_words(data: bytes, offsets: Int64, count: int, one_line: bool) -> Int64
 def scan_integers(data: bytes, at: int, count: int) -> tuple[Int64, int, int]:
     """Values, the offset behind them, and the offset of what is not an integer or -1."""
 
-def integers(data: bytes, spans: Int64) -> tuple[Int64, int]:
-    """Values of the words at spans (n, 2), up to a slash, and the row of the first that is not an integer or -1."""
+def integers(data: bytes, spans: Int64, slash: bool) -> tuple[Int64, int]:
+    """Values of the words at spans (n, 2), up to a slash if it may be there, and the row of the first bad one or -1."""
 
 def numbers(data: bytes, spans: Int64, single: bool) -> tuple[Float64, int]:
     """Values of the words at spans (n, 2), and the row of the first that is not a number or -1; single: of float32."""

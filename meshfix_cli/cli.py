@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from meshfix_cli.untangle import Outcome
 
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
-NAMED = 10  # losses that a note names one by one
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]
@@ -161,12 +160,16 @@ class _Files:
         """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
         from meshfix_cli.meshfile import check_target, output_format
 
-        for other in filter(None, others):
-            _check_other(other, self.source, self.target)
+        named = [other for other in others if other is not None]
+        for i, other in enumerate(named):
+            _check_other(other, self.source, self.target, *named[:i])
         if not self.dry_run:
             check_target(self.target)
         document = held.read(self.source, double=self.double, fix_orientation=self.fix_orientation)
         output = output_format(document, self.target, self.form)
+        if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
+            lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
+            raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")
         if output.binary and self.target == "-" and sys.stdout.isatty() and not self.dry_run:
             raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
         return document, output
@@ -182,14 +185,15 @@ class _Files:
             return stored, ()
         if document.source.layout is None:
             return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
-        more = f" and {len(dropped) - NAMED} more" if len(dropped) > NAMED else ""
-        lost = f"; dropped: {', '.join(dropped[:NAMED])}{more}" if dropped else ""
+        lost = f"; dropped: {', '.join(dropped)}" if dropped else ""
         return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
 
     @property
     def report_stream(self) -> Any:
-        """stderr where the mesh goes to stdout."""
-        return sys.stderr if self.target == "-" and not self.dry_run else sys.stdout
+        """stderr where the mesh goes to stdout, or to a pipe or device that stdout may be."""
+        from meshfix_cli.meshfile import is_stream
+
+        return sys.stderr if is_stream(self.target) and not self.dry_run else sys.stdout
 
 
 @dataclass(frozen=True)
@@ -279,7 +283,15 @@ _writing = _packed(
     click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
     click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
 )
-_cells = click.option("--cells", metavar="FILE", help="Write a mesh with the quality of each element, for ParaView.")
+_cells = click.option("--cells", metavar="FILE", help="Write a .vtu or .vtk with the quality of each element.")
+_require = click.option(
+    "--require",
+    "requirements",
+    type=_Requirement(),
+    multiple=True,
+    metavar="CONDITION",
+    help="Exit with 3 where it is not met, such as 'min_angle >= 5'; may be given more than once.",
+)
 
 
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
@@ -306,6 +318,7 @@ def main() -> None:
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
 @click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
+@_require
 @_holding
 @_reporting
 def untangle(
@@ -319,29 +332,35 @@ def untangle(
     history: str | None,
     cells: str | None,
     allow_inverted: bool,
+    requirements: tuple[Requirement, ...],
 ) -> None:
     """Move interior vertices until no element is inverted, then improve the worst angles.
 
     Strategies: auto (Laplacian sweeps, then the linear programme on stars that are still invalid), and the paper's
     LS (Laplacian), US (linear programme), CS (both for each vertex), LUS (3 Laplacian sweeps, then the programme).
+    For CONDITION see `meshfix quality --help`.
     """
+    from meshfix_cli.meshfile import check_cells, write_text
     from meshfix_cli.report import console, history_csv, with_progress
     from meshfix_cli.untangle import collect, plan, steps
 
     document, output = files.open(held, history, cells)
+    if cells is not None:
+        check_cells(document, cells)
     run = steps(document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, threads=show.threads)
     outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)))
     after = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
     result, notes = files.write(document, after, output)
     notes = (*_what_happened(document, outcome, after, result), *notes)
     if history is not None:
-        _write_text(history, history_csv(outcome.records))
+        write_text(history, history_csv(outcome.records))
     if cells is not None:
         _write_cells(document, result, cells, show.threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
-    report = show.report("untangle", document, stages, notes, records=outcome.records, facts={"strategy": strategy})
+    facts = {"strategy": strategy}
+    report = show.report("untangle", document, stages, notes, requirements, records=outcome.records, facts=facts)
     show.print(report, files.report_stream)
-    sys.exit(VALID if report.valid or allow_inverted else INVERTED)
+    sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 
 def _what_happened(document: Document, outcome: Outcome, after: Mesh, result: Mesh) -> tuple[str, ...]:
@@ -385,14 +404,7 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
 @_cells
 @click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
-@click.option(
-    "--require",
-    "requirements",
-    type=_Requirement(),
-    multiple=True,
-    metavar="CONDITION",
-    help="Exit with 3 where it is not met, such as 'min_angle >= 5'; may be given more than once.",
-)
+@_require
 @_holding
 @_reporting
 def quality(
@@ -417,13 +429,12 @@ def quality(
             if cells is not None:
                 _check_other(cells, source)
                 _write_cells(document, document.mesh, cells, show.threads)
+            stages = {"mesh": document.mesh}
+            report = show.report("quality", document, stages, (), requirements, everything=everything)
         except MeshfixError as error:
             _complain(str(error))
             codes.add(ERROR)
             continue
-        report = show.report(
-            "quality", document, {"mesh": document.mesh}, requirements=requirements, everything=everything
-        )
         show.print(report, sys.stdout)
         codes.add(VALID if report.valid and report.met else INVERTED)
     sys.exit(max(codes) if ERROR not in codes else SOME_FAILED if len(sources) > 1 else ERROR)
@@ -433,8 +444,12 @@ def _check_other(name: str, *meshes: str) -> None:
     """A file beside the mesh must not replace one, and can be written."""
     from meshfix_cli.meshfile import check_target
 
-    if Path(name).resolve() in [Path(mesh).resolve() for mesh in meshes if mesh != "-"]:
-        raise click.UsageError(f"{name} is the name of a mesh")
+    if name == "-":
+        raise click.UsageError("only the mesh can go to stdout; name a file")
+    path = Path(name)
+    for other in (Path(mesh) for mesh in meshes if mesh != "-"):
+        if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
+            raise click.UsageError(f"{name} is the name of a mesh, or of another file to be written")
     check_target(name)
 
 
@@ -445,10 +460,3 @@ def _write_cells(document: Document, mesh: Mesh, target: str, threads: int) -> N
     cell = {**by_element(mesh, threads), "element": document.ids}
     point = {} if mesh is document.mesh else {"distance_moved": distances(document.mesh, mesh)}
     write_cells(document, mesh, target, cell, point)
-
-
-def _write_text(target: str, text: str) -> None:
-    try:
-        Path(target).write_text(text)
-    except OSError as error:
-        raise WriteError(f"{target}: {error.strerror}") from error

@@ -81,7 +81,11 @@ class Topology:
     @cached_property
     def mirrored(self) -> NDArray[np.bool_]:
         """(m,) bool: simplices of components whose numbering has, for most, the other orientation."""
-        return (np.bincount(self.component, weights=self.flipped * 2.0 - 1.0) > 0)[self.component]
+        votes = np.bincount(self.component, weights=self.flipped * 2.0 - 1.0)
+        inner = (self.used & ~self.boundary)[self.simplices].any(axis=1)
+        # Without an inner vertex a part is its boundary: that may be tangled as well as mirrored, so all parts vote.
+        by_itself = np.bincount(self.component, weights=inner) > 0
+        return np.where(by_itself, votes > 0, votes.sum() > 0)[self.component]
 
     @property
     def misnumbered(self) -> NDArray[np.bool_]:

@@ -279,5 +279,5 @@ def _perturbed(facts: Mapping[str, Any]) -> str:
 
 def _listed(report: Report) -> list[tuple[int, list[float]]]:
     first = report.result.inverted_elements[: report.listed]
-    centroids = report.points[report.mesh.topology.simplices[first]].mean(axis=1)
+    centroids = report.points[report.mesh.topology.simplices[first]].mean(axis=1, dtype=np.float64)
     return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]

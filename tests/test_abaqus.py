@@ -92,8 +92,10 @@ def test_sections_and_sets_of_cae(tmp_path: Path) -> None:
     assert source.arrays.point_sets["Set-1"].tolist() == list(range(len(points)))
     assert source.arrays.point_sets["ASSEMBLY Set-1"].tolist() == [0, 1, 2]
     assert source.arrays.cell_sets["Top"][0].tolist() == [4, 5]
-    keywords = "keywords *HEADING, *PREPRINT, *PART, *SOLID SECTION, *ASSEMBLY, *INSTANCE, ..."
-    assert source.untold == ("comments", keywords)
+    assert source.untold[:2] == ("numbers of nodes and elements", "comments")
+    assert source.untold[2].startswith("keywords *HEADING, *PREPRINT, *PART, *SOLID SECTION, *ASSEMBLY, *INSTANCE, ")
+    assert "*MATERIAL, *ELASTIC, *STEP" in source.untold[2]
+    assert "instances are not moved to their places" in source.notes[0]
 
 
 def test_numbers_of_calculix(tmp_path: Path) -> None:
@@ -212,14 +214,45 @@ def test_a_section_of_no_set_would_hide_a_material() -> None:
 
 def test_sets() -> None:
     extra = (
-        b"*ELSET, ELSET=odd, GENERATE\n1, 3, 2\n*ELSET, ELSET=Odd\n2, 99\n*ELSET, ELSET=mixed\nODD, 4, nothing\n"
+        b"*ELSET, ELSET=odd, GENERATE\n1, 3, 2\n*ELSET, ELSET=Odd\n2, 99\n*ELSET, ELSET=mixed\nODD, 4\n"
         b"*ELSET, ELSET=range, GENERATE\n2, 3\n4, 999999999999\n*NSET, NSET=far, GENERATE\n4, 50\n"
     )
     arrays = parsed(SMALL + extra).arrays
     sets = {name: [run.tolist() for run in runs] for name, runs in arrays.cell_sets.items()}
     assert sets == {"All": [[0, 1, 2, 3]], "odd": [[0, 1, 2]], "mixed": [[0, 1, 2, 3]], "range": [[1, 2, 3]]}
     assert arrays.point_sets["far"].tolist() == [3, 4]
-    assert not arrays.cell
+    with pytest.raises(ReadError, match="names the element set NOTHING, and there is none"):
+        _ = parsed(SMALL + b"*ELSET, ELSET=odd\n1, nothing\n").arrays
+
+
+def test_words_may_be_shortened_and_names_have_dots() -> None:
+    extra = b"*ELSET, ELS=A.1, GEN\n1, 3\n*ELSET, ELSET=B\nA.1\n*SOLID SECTION, ELS=b, MATERIAL=m\n"
+    arrays = parsed(SMALL + extra).arrays
+    assert arrays.cell_sets["B"][0].tolist() == [0, 1, 2]
+    assert arrays.cell["abaqus:section"][0].tolist() == [1, 1, 1, 0]
+    for refused in (b"*NODE, SYS=C\n9, 1., 0.\n", b"*NODE, INP=x.txt\n"):
+        with pytest.raises(ReadError, match="which meshfix does not read"):
+            parsed(SMALL + refused)
+
+
+def test_sets_of_elements_are_materials_where_no_section_says_so() -> None:
+    deck = SMALL.replace(b"ELSET=All\n", b"ELSET=L\n")
+    half = deck.replace(b"3, 3, 4, 50\n", b"*ELEMENT, TYPE=CPS3, ELSET=R\n3, 3, 4, 50\n")
+    assert parsed(half).regions == ("abaqus:section",)
+    assert np.concatenate(parsed(half).arrays.cell["abaqus:section"]).tolist() == [1, 1, 2, 2]
+
+
+def test_elements_whose_faces_are_named_are_not_renumbered() -> None:
+    source = parsed(SMALL + b"*SURFACE, TYPE=ELEMENT, NAME=Load\n1, S2\n")
+    assert source.layout is not None
+    with pytest.raises(ReadError, match="names faces of elements"):
+        source.layout.rewritten(source.points, source.points, {0: np.array([0])})
+
+
+def test_files_may_be_included_by_steps() -> None:
+    assert len(parsed(SMALL + b"*STEP\n*INCLUDE, INPUT=loads.inp\n*END STEP\n").points) == 5
+    with pytest.raises(ReadError, match=r"uses \*INCLUDE"):
+        parsed(SMALL + b"*INCLUDE, INPUT=mesh.inp\n")
 
 
 def test_a_set_may_name_itself() -> None:
@@ -231,7 +264,7 @@ def test_a_mark_of_byte_order_and_blanks_before_stars() -> None:
     source = parsed(b"\xef\xbb\xbf" + SMALL.replace(b"*ELEMENT", b"  ** no\n \t*ELEMENT"))
     assert len(source.points) == 5
     assert source.cells[0].vertices.tolist() == [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
-    assert source.untold == ("comments",)
+    assert source.untold == ("numbers of nodes and elements", "comments")
 
 
 @pytest.mark.parametrize(

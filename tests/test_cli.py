@@ -185,7 +185,6 @@ def test_a_directory_as_input_or_output(tmp_path: Path) -> None:
 
 
 def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
-    assert "no mesh format has the extension '.xyz'" in error_line("untangle", TANGLED, tmp_path / "out.xyz")
     assert "does not exist" in error_line("untangle", TANGLED, tmp_path / "nowhere" / "out.vtk")
     assert list(tmp_path.iterdir()) == []
     line = error_line("untangle", "--history", tmp_path / "no" / "h.csv", TANGLED, tmp_path / "o.vtk")
@@ -198,6 +197,11 @@ def test_history_never_replaces_a_mesh(tmp_path: Path) -> None:
     mesh.write_bytes(Path(TANGLED).read_bytes())
     assert "is the name of a mesh" in error_line("untangle", "--history", mesh, mesh, tmp_path / "o.vtk", code=2)
     assert "is the name of a mesh" in error_line("untangle", "--history", mesh, TANGLED, mesh, code=2)
+    (tmp_path / "link.csv").hardlink_to(mesh)
+    line = error_line("untangle", "--history", tmp_path / "link.csv", mesh, tmp_path / "o.vtk", code=2)
+    assert "is the name of a mesh" in line
+    twice = ["--history", tmp_path / "x", "--cells", tmp_path / "x"]
+    assert "of another file to be written" in error_line("untangle", *twice, mesh, tmp_path / "o.vtk", code=2)
     assert mesh.read_bytes() == Path(TANGLED).read_bytes()
 
 
@@ -236,7 +240,10 @@ def test_cells_say_where(tmp_path: Path) -> None:
 
 
 def test_cells_need_a_format_that_holds_them(tmp_path: Path) -> None:
-    assert "cannot hold cell data measure" in error_line("quality", "--cells", tmp_path / "cells.obj", TANGLED)
+    for command in (["quality"], ["untangle", tmp_path / "o.vtk"]):
+        line = error_line(command[0], "--cells", tmp_path / "cells.obj", TANGLED, *command[1:])
+        assert "quality can be drawn from .vtu and .vtk files, and this would be obj" in line
+    assert "name a file" in error_line("quality", "--cells", "-", TANGLED, code=2)
     assert "is the name of a mesh" in error_line("quality", "--cells", TANGLED, TANGLED, code=2)
     assert "takes one INPUT" in error_line("quality", "--cells", tmp_path / "c.vtu", TANGLED, VALID, code=2)
     assert list(tmp_path.iterdir()) == []
@@ -328,6 +335,29 @@ def test_double_needs_a_format_that_has_it(tmp_path: Path) -> None:
     triangle.write(tmp_path / "in.stl", binary=True)
     line = error_line("untangle", "--double", tmp_path / "in.stl", tmp_path / "out.stl")
     assert "coordinates of stl files cannot be double" in line
+
+
+def test_what_meshio_would_write_anew_is_not_replaced_without_a_backup(tmp_path: Path) -> None:
+    path = tmp_path / "in.off"
+    meshio.read(TANGLED).write(path)
+    original = path.read_bytes()
+    assert "name another OUTPUT, or use --backup" in error_line("untangle", path, path)
+    assert path.read_bytes() == original
+    assert "note: written anew as off by meshio" in run("untangle", "--backup", path, path).stdout.decode()
+    assert (tmp_path / "in.off.bak").read_bytes() == original
+
+
+def test_requirements_where_the_repair_happens(tmp_path: Path) -> None:
+    text = run("untangle", "--require", "min_angle > 89", TANGLED, tmp_path / "o.vtk", code=3).stdout.decode()
+    assert "NOT MET: min_angle > 89" in text
+    assert read(tmp_path / "o.vtk").mesh.check()[0] == 0
+    run("untangle", "-q", "--require", "min_angle > 10", TANGLED, tmp_path / "o.vtk")
+
+
+def test_coordinates_near_the_end_of_single_precision(tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [3e38, 0, 0], [3e38, 3e38, 0], [0, 3e38, 0]], "f4")
+    meshio.Mesh(points, [("triangle", [[0, 1, 2], [0, 3, 2]])]).write(tmp_path / "huge.vtk")
+    assert run("quality", "--json", tmp_path / "huge.vtk", code=3).stderr == b""
 
 
 def test_pipes_and_devices_with_names(tmp_path: Path) -> None:

@@ -44,6 +44,20 @@ main(sys.argv[1:])
 """
 
 
+# meshio takes its time.
+SLOW_MESHIO = """
+import sys, time
+import meshio
+def slow(*arguments, **options):
+    sys.__stdout__.write("writing\\n")
+    sys.__stdout__.flush()
+    time.sleep(60)
+meshio.read = meshio.write = slow
+from meshfix_cli.cli import main
+main(sys.argv[1:])
+"""
+
+
 def start(code: str, *arguments: object) -> subprocess.Popen[bytes]:
     child = subprocess.Popen(
         [sys.executable, "-c", code, *map(str, arguments)], stdout=subprocess.PIPE, stderr=subprocess.PIPE
@@ -67,6 +81,18 @@ def test_killed_at_twenty_moments_of_writing(tmp_path: Path, random: np.random.G
             time.sleep(random.uniform(0, 0.05))
             child.kill()
         assert path.read_bytes() in versions
+
+
+@POSIX
+@pytest.mark.parametrize("source", ["plate_tangled.vtk", "mesh.off"])
+def test_a_signal_is_no_error_of_meshio(source: str, tmp_path: Path) -> None:
+    (tmp_path / "mesh.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    path = SAMPLES / source if (SAMPLES / source).exists() else tmp_path / source
+    with start(SLOW_MESHIO, "untangle", "-q", path, tmp_path / "out.ply") as child:
+        child.send_signal(signal.SIGTERM)
+        _, complaint = child.communicate(timeout=30)
+    assert (child.returncode, complaint) == (143, b"")
+    assert [p.name for p in tmp_path.iterdir()] == ["mesh.off"]
 
 
 @POSIX

@@ -375,9 +375,6 @@ def test_nodes_of_curved_cells_come_in_the_order_of_vtk(
 @pytest.mark.parametrize(
     "data",
     [
-        text_2(version="4.0"),
-        text_2(version="3"),
-        text_2(version="5.0"),
         text_2(elements=FAN + "5 34 2 1 1 4 1 2 3 4\n"),
         text_4(kind=35),
         text_4(kind=999),
@@ -385,6 +382,12 @@ def test_nodes_of_curved_cells_come_in_the_order_of_vtk(
 )
 def test_what_is_left_to_meshio(data: bytes) -> None:
     assert gmsh.parse(data) is None
+
+
+@pytest.mark.parametrize("version", ["1", "3", "4.0", "5.0"])
+def test_versions_that_are_not_read(version: str) -> None:
+    with pytest.raises(ReadError, match=f"version {version}, which is not read: save it as 2.2 or 4.1"):
+        gmsh.parse(text_2(version=version))
 
 
 @pytest.mark.parametrize("version", ["2", "2.0", "2.1", "2.2"])

@@ -110,6 +110,15 @@ def test_components_of_either_orientation() -> None:
     assert not mesh.topology.misnumbered.any()
 
 
+def test_a_part_without_an_inner_vertex_is_judged_with_the_others() -> None:
+    """Each triangle has points of its own: the one turned over is tangled, for all that its part could tell."""
+    points = np.concatenate([np.array(SQUARE)[corners] for corners in FAN])
+    cells = np.arange(len(points)).reshape(-1, 3)
+    cells[2] = cells[2, ::-1]
+    mesh = Mesh.build(points, cells)
+    assert np.flatnonzero(mesh.topology.misnumbered).tolist() == [2]
+
+
 def test_a_star_too_large_to_number_is_refused() -> None:
     turn = np.linspace(0, 2 * np.pi, 70001)[:-1]
     points = np.concatenate([[[0.0, 0.0]], np.column_stack([np.cos(turn), np.sin(turn)])])

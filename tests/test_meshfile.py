@@ -228,6 +228,37 @@ def test_first_bytes_tell_the_format(text: bytes, name: str, binary: bool | None
     assert (form.name, form.binary) == (name, binary)
 
 
+def test_a_long_comment_is_read_once() -> None:
+    """A pattern that tries all ways to divide blanks among comments would take hours."""
+    for comment in (b"# comment\r\n", b"# # # #   \n"):
+        form = sniff(comment * 60 + b"v 0 0 0\r\nv 1 0 0\r\nf 1 2 3\r\n")
+        assert form is not None
+        assert form.name == "obj"
+    form = sniff(b"# a\n # b\nMeshVersionFormatted 2\n")
+    assert form is not None
+    assert form.name == "medit"
+
+
+def test_files_that_need_another_beside_them(tmp_path: Path, bracket: Mesh) -> None:
+    """A .ele file has its points in a .node file."""
+    meshio.Mesh(bracket.points, [("tetra", bracket.topology.simplices)]).write(tmp_path / "mesh.ele")
+    np.testing.assert_array_equal(read(tmp_path / "mesh.ele").mesh.points, bracket.points)
+
+
+def test_an_unknown_extension_is_no_format(tmp_path: Path) -> None:
+    document = read(SAMPLES / "two_materials.msh")
+    assert output_format(document, str(tmp_path / "mesh.orig")) == document.format
+    (tmp_path / "wrong.vtk").write_bytes((SAMPLES / "two_materials.msh").read_bytes())
+    wrong = read(tmp_path / "wrong.vtk")
+    assert output_format(wrong, str(tmp_path / "wrong.vtk")) == document.format
+    assert output_format(wrong, str(tmp_path / "other.vtk")).reader == "vtk"
+
+
+def test_gmsh_4_is_not_made_of_other_files(tmp_path: Path) -> None:
+    with pytest.raises(WriteError, match="use --format gmsh22"):
+        output_format(read(SAMPLES / "two_materials.msh"), str(tmp_path / "o.msh"), "gmsh")
+
+
 @pytest.mark.parametrize("noise", [b"", b"\x00\x01\x02\xff" * 99, b"hello", b"<?xml?><svg/>"])
 def test_noise_has_no_format(noise: bytes) -> None:
     assert sniff(noise) is None

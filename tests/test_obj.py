@@ -139,8 +139,25 @@ def test_commas_in_names_and_comments_are_no_numbers() -> None:
     assert cells(data) == {"triangle": [[0, 1, 2]]}
 
 
-def test_continued_lines_are_left_to_others() -> None:
-    assert obj.parse(VERTICES + b"f 1 2 \\\n3\n") is None
+@pytest.mark.parametrize("end", [b"\n", b"\r\n", b" \n"])
+def test_lines_may_be_continued_and_comments_not(end: bytes) -> None:
+    data = b"# from C:\\models\\\n" + VERTICES + b"f 1 2 \\" + end + b"3\n"
+    assert cells(data) == {"triangle": [[0, 1, 2]]}
+    source = parse(data)
+    assert source.layout is not None
+    assert source.layout.rewritten(source.points, source.points, {}) == data
+    turned = source.layout.rewritten(source.points, source.points, {0: np.array([0])})
+    assert turned == data.replace(b"f 1 2", b"f 2 1")
+
+
+def test_materials_are_regions() -> None:
+    faces = b"f 1 2 3\nusemtl steel # a\nf 1 2 3\nusemtl copper\nf 1 2 3\nusemtl steel\nf 1 2 3\n"
+    source = parse(VERTICES + faces)
+    assert source.regions == ("obj:material",)
+    labels = source.arrays.cell["obj:material"][0].tolist()
+    assert labels[1] == labels[3]
+    assert len({*labels[:3]}) == 3
+    assert parse(VERTICES + b"f 1 2 3\n").regions == ()
 
 
 @pytest.mark.parametrize("variant", files_obj.FILES)

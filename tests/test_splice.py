@@ -18,6 +18,7 @@ from conftest import SAMPLES
 from test_cli import run
 
 from meshfix_cli import read, untangle, write
+from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import Document
 from meshfix_cli.meshfile.formats import sniff
 
@@ -52,6 +53,11 @@ def spatial(points: np.ndarray) -> np.ndarray:
     return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
 
 
+def in_order(variant: str, *points: np.ndarray) -> list[np.ndarray]:
+    """The points as they are, but those of gmsh 2.2, which gmsh reads in an order of its own: these are sorted."""
+    return [p[np.lexsort(p.T)] for p in points] if variant.endswith("_2.msh") else list(points)
+
+
 def without_points(data: bytes) -> bytes:
     """A .vtu file without the arrays of its points, and without the offsets, which depend on their lengths."""
     head, _, tail = data.partition(b"<AppendedData")
@@ -82,7 +88,8 @@ def test_another_program_finds_other_coordinates_and_nothing_else(form: str, var
     after, others_after = MODULES[form].read_independently(target)
     np.testing.assert_equal(others_after, others_before)
     assert others_before
-    np.testing.assert_array_equal(sorted(map(tuple, after.tolist())), sorted(map(tuple, spatial(points).tolist())))
+    found, expected = in_order(variant, after, spatial(points))
+    np.testing.assert_array_equal(found, expected)
     assert (before != after).any()
 
 
@@ -143,9 +150,13 @@ def test_the_orientation_is_mended_in_the_file(form: str, variant: str, tmp_path
     kind = "triangle" if document.mesh.dimension == 2 else "tetra"
     run = next(i for i, cells in enumerate(document.source.cells) if cells.type == kind and len(cells.vertices) > 2)
     some = {run: np.array([0, 2])}
+    if form in ("gmsh", "ply") and variant.startswith(("views", "meshlab")):
+        with pytest.raises(ReadError, match="has data for the corners of"):
+            layout.rewritten(document.source.points, document.source.points, some)
+        return
     path.write_bytes(layout.rewritten(document.source.points, document.source.points, some))
-    wrong = read(path)
-    assert wrong.mesh.topology.misnumbered.sum() >= 1 or wrong.mesh.topology.mirrored.any()
+    here = dict(read(path).reversed_cells())
+    assert {i: rows.tolist() for i, rows in here.items()} == {run: [0, 2]}
     assert not read(path, fix_orientation=True).mesh.topology.flipped.any()
 
 
@@ -160,7 +171,7 @@ def test_single_precision_becomes_double(form: str, tmp_path: Path) -> None:
         assert points.dtype == np.float64
         assert (points != points.astype(np.float32)).any()
         after, others = MODULES[form].read_independently(target)
-        np.testing.assert_array_equal(sorted(map(tuple, after.tolist())), sorted(map(tuple, spatial(points).tolist())))
+        np.testing.assert_array_equal(after, spatial(points))
         expected = MODULES[form].read_independently(path)[1]
         if form == "medit":  # where the type is a number of its own
             assert (expected.pop("MeshVersionFormatted"), others.pop("MeshVersionFormatted")) == (["1"], ["2"])

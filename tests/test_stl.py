@@ -156,8 +156,8 @@ def test_a_plane_mesh_keeps_its_third_coordinate(tmp_path: Path) -> None:
 def test_solids_are_regions_and_attributes_are_data() -> None:
     several = b"solid a\n" + FACETS[0] + b"endsolid a\nSOLID b\n" + FACETS[1].upper() + FACETS[0] + b"ENDSOLID b"
     source = parse(several)
-    assert source.regions == ("solid",)
-    assert [runs.tolist() for runs in source.arrays.cell["solid"]] == [[0, 1, 1]]
+    assert source.regions == ("stl:solid",)
+    assert [runs.tolist() for runs in source.arrays.cell["stl:solid"]] == [[0, 1, 1]]
     assert (source.untold, parse(TEXT).untold, parse(TEXT.replace(b" two", b"")).untold) == (
         ("names of solids",), ("names of solids",), (),
     )  # fmt: skip
@@ -169,7 +169,7 @@ def test_solids_are_regions_and_attributes_are_data() -> None:
 def test_the_interface_of_solids_is_held(tmp_path: Path) -> None:
     files_stl.FILES["patches.stl"](tmp_path / "a.stl")
     document = read(tmp_path / "a.stl")
-    assert document.fixed["between regions of solid"] > 0
+    assert document.fixed["between regions of stl:solid"] > 0
 
 
 @pytest.mark.parametrize("variant", files_stl.FILES)

@@ -164,7 +164,8 @@ def test_labels_of_materials_are_regions(tmp_path: Path) -> None:
     assert source.regions == ("gmsh:physical",)
     assert [set(np.ravel(runs).tolist()) for runs in source.arrays.cell["gmsh:physical"]] == [{1}, {2}]
     broken = fan("CELL_DATA 4\nSCALARS gmsh:physical int\nLOOKUP_TABLE default\n1 1 x 2")
-    assert parsed(broken).regions == ()
+    with pytest.raises(ReadError, match="gmsh:physical"):
+        parsed(broken)
 
 
 def test_a_name_with_blanks_can_be_asked_for(tmp_path: Path) -> None:

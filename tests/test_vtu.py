@@ -230,7 +230,7 @@ def test_polyhedra_and_wedges_are_held(tmp_path: Path) -> None:
 def test_regions_and_what_no_other_format_holds(tmp_path: Path) -> None:
     assert parsed(made("meshio.vtu", tmp_path)).regions == ("gmsh:physical",)
     source = parsed(made("ascii_double.vtu", tmp_path))
-    assert source.regions == ()
+    assert source.regions == ("MaterialIDs",)
     assert source.untold == ("comments", "field data")
 
 
@@ -244,34 +244,44 @@ def test_a_damaged_array_of_data_is_left_out_and_the_mesh_is_read(tmp_path: Path
     np.testing.assert_array_equal(parsed(file).points, points)
 
 
-def test_labels_of_regions_that_are_damaged_are_no_regions(tmp_path: Path) -> None:
+def test_labels_of_regions_that_are_damaged_are_an_error(tmp_path: Path) -> None:
+    """Else the interface of the materials would be free."""
     data = made("meshio.vtu", tmp_path)
-    source = parsed(data.replace(b'type="Int64" Name="gmsh:physical"', b'type="String" Name="gmsh:physical"'))
-    assert source.regions == ()
-    assert source.arrays.cell == {}
+    with pytest.raises(ReadError, match="'gmsh:physical' are damaged"):
+        parsed(data.replace(b'type="Int64" Name="gmsh:physical"', b'type="String" Name="gmsh:physical"'))
+
+
+def test_vertices_of_ghost_cells_are_held(tmp_path: Path) -> None:
+    """Another piece has them as well, and one vertex must not get two positions."""
+    data = made("ascii_double.vtu", tmp_path)
+    ghosts = parsed(data.replace(b'Name="MaterialIDs"', b'Name="vtkGhostType"'))  # all of them
+    assert ghosts.held is not None
+    assert ghosts.held[np.unique(ghosts.vertices_of("tetra", 4))].all()
+    assert parsed(data).held is None
 
 
 @pytest.mark.parametrize(
     ("old", "new"),
     [
         (b"UnstructuredGrid", b"PolyData"),
-        (b"<UnstructuredGrid>", b'<UnstructuredGrid TimeValues="0 1">'),
         (b'type="Float64" Name="Points"', b'type="Int64" Name="Points"'),
         (b'Name="Points" NumberOfComponents="3"', b'Name="Points" NumberOfComponents="2"'),
     ],
 )
-def test_other_kinds_of_files_are_left_to_meshio(old: bytes, new: bytes, tmp_path: Path) -> None:
+def test_other_kinds_of_files_are_refused(old: bytes, new: bytes, tmp_path: Path) -> None:
     data = made("raw_double.vtu", tmp_path)
     assert old in data
-    assert vtu.parse(data.replace(old, new)) is None
+    with pytest.raises(ReadError, match=r"no unstructured grid|not three Float32"):
+        vtu.parse(data.replace(old, new))
 
 
-def test_arrays_that_share_their_bytes_are_left_to_meshio(tmp_path: Path) -> None:
+def test_arrays_that_share_their_bytes_are_refused(tmp_path: Path) -> None:
     data = made("raw_double.vtu", tmp_path)
     offset = re.search(rb'Name="Points"[^>]*\soffset="(\d+)"', data)
     assert offset is not None
     shared = re.sub(rb'(Name="velocity"[^>]*\soffset=")\d+', rb"\g<1>" + offset[1], data)
-    assert vtu.parse(shared) is None
+    with pytest.raises(ReadError, match="share their bytes"):
+        vtu.parse(shared)
 
 
 TEXT = b"""<VTKFile type="UnstructuredGrid"><UnstructuredGrid><Piece NumberOfPoints="4" NumberOfCells="2"><Points>
@@ -306,7 +316,7 @@ def test_text_may_touch_the_tags_and_the_encoding_may_be_another(mark: bytes) ->
         (b">3 6<", b">7 6<", "do not fit"),
         (b">3 6<", b">3 -6<", "'connectivity' has more than 0 numbers"),
         (b">0 1 2 0 2 3<", b">0 1 2 0 2<", "'connectivity' has less than 6 numbers"),
-        (b">0 1 2 0 2 3<", b">0 1/7 2 0 2 3<", "a slash"),
+        (b">0 1 2 0 2 3<", b">0 1/7 2 0 2 3<", "'1/7' is not an integer"),
         (b">0 1 2 0 2 3<", b">0 1.5 2 0 2 3<", "'1.5' is not an integer"),
         (b" 1 1 0 ", b" 1 abc 0 ", "line 2: 'abc' is not a number"),
         (b'"Int8" Name="offsets"', b'"Float32" Name="offsets"', "'offsets' does not hold integers"),

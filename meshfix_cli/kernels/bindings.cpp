@@ -243,7 +243,7 @@ auto scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count
     for (std::int64_t value = 0; static_cast<std::int64_t>(values.size()) < count; values.push_back(value)) {
         const Span word = next_word(text, at, false);
         const std::int64_t span[2] = {word.begin, word.end};
-        if (word.begin < 0 || !read_integer(word_at(text, span), value)) {
+        if (word.begin < 0 || !read_integer(word_at(text, span), value, false)) {
             bad = word.begin < 0 ? static_cast<std::int64_t>(text.size()) : word.begin;
             break;
         }
@@ -265,8 +265,9 @@ auto read_words(const nb::bytes& data, const Matrix<const std::int64_t>& spans, 
     return std::make_pair(to_numpy(std::move(values)), bad);
 }
 
-auto integers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans) {
-    return read_words<std::int64_t, std::int64_t>(data, spans, read_integer);
+auto integers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, bool slash) {
+    return read_words<std::int64_t, std::int64_t>(
+        data, spans, [slash](std::string_view word, std::int64_t& value) { return read_integer(word, value, slash); });
 }
 
 auto numbers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, bool single) {
@@ -318,7 +319,7 @@ NB_MODULE(_kernels, m) {
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
     m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
-    m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert());
+    m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert(), "slash"_a);
     m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
     m.def("shortest", &shortest_py, "values"_a.noconvert(), "single"_a, "longest"_a);
     m.def("replace", &replace_py, "data"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());

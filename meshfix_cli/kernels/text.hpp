@@ -32,11 +32,16 @@ inline Span next_word(std::string_view text, std::int64_t at, bool one_line) {
     return word;
 }
 
-// Reads an integer that is the word, or what stands before its first slash (the corners of .obj).
-inline bool read_integer(std::string_view word, std::int64_t& value) {
-    if (!word.empty() && word[0] == '+') word.remove_prefix(1);
+// A number may begin with a plus, of which from_chars does not know.
+inline std::string_view without_plus(std::string_view word) {
+    return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
+}
+
+// Reads an integer that is the word or, with `slash`, what stands before its first slash (the corners of .obj).
+inline bool read_integer(std::string_view word, std::int64_t& value, bool slash) {
+    word = without_plus(word);
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    return error == std::errc() && (end == word.data() + word.size() || *end == '/');
+    return error == std::errc() && (end == word.data() + word.size() || (slash && *end == '/'));
 }
 
 // The slow way: Fortran's exponents, numbers too large or too small, and libraries without from_chars.
@@ -56,7 +61,7 @@ bool read_number_slowly(std::string_view word, Real& value) {
 template <class Real>
 bool read_number(std::string_view word, Real& value) {
 #if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
-    const std::string_view digits = !word.empty() && word[0] == '+' ? word.substr(1) : word;
+    const std::string_view digits = without_plus(word);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error == std::errc() && end == digits.data() + digits.size()) return true;
 #endif

@@ -16,12 +16,22 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh import CELL_NAMES, Mesh
 from meshfix_cli.meshfile import formats
-from meshfix_cli.meshfile.atomic import check_target, write_file
+from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_text
 from meshfix_cli.meshfile.document import SIMPLEX, Document, build, counted, with_reversed
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 
-__all__ = ["Document", "check_target", "output_format", "read", "write", "write_cells"]
+__all__ = [
+    "Document",
+    "check_cells",
+    "check_target",
+    "is_stream",
+    "output_format",
+    "read",
+    "write",
+    "write_cells",
+    "write_text",
+]
 
 ROUNDING = 1e-4  # relative to the size of the mesh: more than any format rounds, less than any mesh can bear
 
@@ -63,9 +73,11 @@ def read(
         form = formats.sniff(data) or formats.by_name(Path(name))
         if form is None:
             raise ReadError("the format is not recognised")
-        if double:
-            data = _promoted(data, form)
-        document = build(name, _parse(data, form), form, fix, regions)
+        beside = None if streamed or not Path(name).is_file() else Path(name)  # a pipe can be read only once
+        source = _parse(data, form, beside)
+        if double and source.points.dtype != np.float64:
+            source = _promoted(data, form)
+        document = build(name, source, form, fix, regions)
         rows = document.reversed_cells() if fix_orientation else {}
         if rows:
             note = f"renumbered {counted(sum(map(len, rows.values())), *CELL_NAMES[document.mesh.dimension])}"
@@ -73,8 +85,7 @@ def read(
             document = replace(document, notes=(*document.notes, note))
         return document
     except MeshfixError as error:
-        text = str(error)
-        raise type(error)(text if text.startswith(name) else f"{name}: {text}") from error
+        raise type(error)(f"{name}: {error}") from error
 
 
 def write(
@@ -107,8 +118,9 @@ def write(
     check_target(target)
     points, source = document.file_points(mesh), document.source
     stored = document.in_plane(points.astype(np.float64), mesh)
-    if source.layout is not None and document.is_kept_by(form):
-        spliced = source.layout.rewritten(source.points, points, {})
+    layout = source.layout if form == document.format else None
+    if layout is not None:
+        spliced = layout.rewritten(source.points, points, {})
         write_file(target, lambda temporary: temporary.write_bytes(spliced), backup)
         return stored, ()
     dropped: tuple[str, ...] = ()
@@ -148,37 +160,42 @@ def write_cells(
     WriteError
         Nothing was written.
     """
-    form = output_format(document, target)
+    form = check_cells(document, target)
     arrays = Arrays(point=point, cell={name: [values] for name, values in cell.items()})
     source = Source(
         document.file_points(mesh), [Cells(SIMPLEX[mesh.dimension], document.simplices)], load=lambda: arrays
     )
 
     def produce(temporary: Path) -> None:
-        _, dropped = _write_anew(temporary, source, source.points, form, mesh.dimension)
-        if dropped:
-            raise WriteError(f"{target}: the format {form.name} cannot hold {', '.join(dropped)}")
+        _write_anew(temporary, source, source.points, form, mesh.dimension)
 
     write_file(target, produce)
+
+
+def check_cells(document: Document, target: str) -> Format:
+    """Return the format of a file for `write_cells`; WriteError where that does not hold the data."""
+    form = output_format(document, target)
+    if form.reader not in ("vtk", "vtu"):
+        raise WriteError(f"{target}: quality can be drawn from .vtu and .vtk files, and this would be {form.name}")
+    return form
 
 
 def output_format(document: Document, target: str, name: str | None = None) -> Format:
     """Return the format of the output: the one named, else that of the target's extension, else the input's.
 
+    A target that is the input keeps its format, and one with an extension that is not known has it.
+
     Raises
     ------
     WriteError
-        The extension is not known, or the format cannot be written.
+        The format cannot be written.
     """
     if name is not None:
         form = Format(name)
-    elif target == "-" or not Path(target).suffix:
+    elif target == "-" or document.is_file(target):
         form = document.format
     else:
-        known = formats.by_name(Path(target))
-        if known is None:
-            raise WriteError(f"{target}: no mesh format has the extension {Path(target).suffix!r}")
-        form = known
+        form = formats.by_name(Path(target)) or document.format
     if form.reader == document.format.reader and name is None:
         return document.format if document.source.layout is not None else _writable(document.format, target)
     if form.binary is None and form.name in formats.BOTH:
@@ -187,6 +204,8 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
 
 
 def _writable(form: Format, target: str) -> Format:
+    if form.name == "gmsh":  # meshio leaves out entities that own no node, and gmsh does not open that
+        raise WriteError(f"{target}: files of gmsh 4.1 are written back, but not made of others; use --format gmsh22")
     if form.name not in formats.writers():
         raise WriteError(f"{target}: the format {form.name} cannot be written")
     return form
@@ -203,8 +222,8 @@ def _read_bytes(path: Path | None) -> bytes:
     return data
 
 
-def _parse(data: bytes, form: Format) -> Source:
-    """Let the format's own module read; what it does not know, meshio reads."""
+def _parse(data: bytes, form: Format, path: Path | None = None) -> Source:
+    """Let the format's own module read; what it does not know, meshio reads, which may look for files beside it."""
     source = None
     if form.reader in formats.OWN:
         try:
@@ -214,7 +233,7 @@ def _parse(data: bytes, form: Format) -> Source:
     if source is None:
         from meshfix_cli.meshfile import through_meshio
 
-        source = through_meshio.read_bytes(data, form)
+        source = through_meshio.read(data, form, path)
     return source
 
 
@@ -223,13 +242,11 @@ def _module(form: Format) -> Any:
     return import_module(f"meshfix_cli.meshfile.{form.reader}")
 
 
-def _promoted(data: bytes, form: Format) -> bytes:
-    """Return the file with coordinates in float64."""
-    if form.reader in formats.OWN and hasattr(_module(form), "promoted"):
-        data = _module(form).promoted(data)
-    if _parse(data, form).points.dtype != np.float64:
+def _promoted(data: bytes, form: Format) -> Source:
+    """Return what the file holds with its coordinates in float64."""
+    if form.reader not in formats.OWN or not hasattr(_module(form), "promoted"):
         raise ReadError(f"coordinates of {form.name} files cannot be double")
-    return data
+    return _parse(_module(form).promoted(data), form)
 
 
 def _with_reversed(source: Source, rows: dict[int, NDArray[np.int64]], form: Format) -> Source:
@@ -250,16 +267,20 @@ def _write_anew(
     """
     from meshfix_cli.meshfile import through_meshio
 
-    through_meshio.write_path(path, source, points, form)
+    through_meshio.write(path, source, points, form)
     kind = SIMPLEX[dimension], dimension + 1
     expected = source.vertices_of(*kind)
     held = points.astype(np.float64)
     size = float(np.ptp(held[expected], axis=(0, 1)).max())
     try:
-        back = _parse(path.read_bytes(), form)
+        back = _parse(path.read_bytes(), form, path)
+        if not len(back.vertices_of(*kind)):
+            raise WriteError(f"cannot be written as {form.name}: that holds no {CELL_NAMES[dimension][1]}")
         corners = _spatial(back.points)[back.vertices_of(*kind)]
         difference = np.abs(corners - _spatial(held)[expected]).max()
         dropped = source.lost_in(back)
+    except WriteError:
+        raise
     except (MeshfixError, IndexError, ValueError) as error:
         raise WriteError(f"cannot be written as {form.name}: what was written does not read back") from error
     if not difference <= ROUNDING * size:

@@ -21,6 +21,7 @@ from meshfix_cli.meshfile.text import Spans, integers_at, line_words
 
 _LONGEST = 20  # characters of a number
 _EMPTY_FIELD = re.compile(rb",[ \t]*,")
+_FACE = re.compile(rb",[ \t]*(?:[SPFR][1-6]|SPOS|SNEG)\b", re.IGNORECASE)
 
 # Families of elements, behind which the number of nodes tells the shape; all others only hold their nodes.
 _SOLID = re.compile(r"(?:[A-Z]{0,3}C3D|Q3D)(4|5|6|8|10|15|20)(?![\dV])")
@@ -39,9 +40,14 @@ def parse(data: bytes) -> Source | None:
     counts = [len(run.vertices) for run in cells]
     elements = Labels({block: run.ids for block, run in zip(blocks, cells, strict=True) if run.ids is not None})
     sections = [block for block in deck.blocks if block.keyword.endswith("SECTION") and "ELSET" in block.parameters]
+    sections = sections or [block for block in blocks if "ELSET" in block.parameters]  # the mesh of another file
     load = partial(arrays, deck, nodes, elements, counts, sections)
     points = coordinates.read(deck.text)
-    return Source(points, cells, layout, load, (SECTION,) * bool(sections), untold=deck.untold())
+    notes = (
+        "instances are not moved to their places in the assembly: coordinates are those of the parts",
+    ) * deck.placed
+    untold = ("numbers of nodes and elements", *deck.untold())
+    return Source(points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes)
 
 
 def _nodes(deck: Deck) -> tuple[Places, Labels]:
@@ -121,6 +127,8 @@ def _vertices(nodes: Labels, scope: str, numbers: NDArray[np.int64], elements: N
 
 
 def _corners(deck: Deck, block: Block) -> Places:
+    if _FACE.search(deck.text):
+        raise ReadError("names faces of elements (S1, P2, ...), which would be others if elements were renumbered")
     columns = _shape(block.parameters["TYPE"].upper())[1] + 1
     return Places.of_text(deck.words(block).reshape(-1, columns, 2)[:, 1:], "i8")
 

@@ -18,6 +18,8 @@ _BLANK = b" \t\xef\xbb\xbf"  # a mark of the order of bytes is a blank as well
 _STAR = re.compile(rb"\*[^\n]*")
 _CONTINUATION = re.compile(rb"\n\s*[A-Za-z][^\n]*")
 _GENERATING = ("NGEN", "NCOPY", "NFILL", "NMAP", "ELGEN", "ELCOPY", "INCLUDE", "SYSTEM")
+# Abaqus takes the beginning of a word for the word; these are the parameters that are looked at.
+_PARAMETERS = ("ELSET", "GENERATE", "INPUT", "INSTANCE", "NAME", "NSET", "PART", "SYSTEM", "TYPE")
 _NESTED = ("PART", "INSTANCE", "ASSEMBLY", "STEP")
 
 
@@ -82,8 +84,12 @@ class Deck:
         """Name what is not of the mesh: comments and keywords."""
         keywords = dict.fromkeys(block.keyword for block in self.blocks)
         names = [f"*{keyword}" for keyword in keywords if keyword not in MESH and not keyword.startswith("END")]
-        some = f"keywords {', '.join(names[:6])}{', ...' * (len(names) > 6)}"
-        return ("comments",) * self.comments + (some,) * bool(names)
+        return ("comments",) * self.comments + (f"keywords {', '.join(names)}",) * bool(names)
+
+    @property
+    def placed(self) -> bool:
+        """Whether an instance is moved to its place in the assembly."""
+        return any(self.text[block.begin : block.end].strip() for block in self.of("INSTANCE"))
 
     def _codes(self, block: Block) -> NDArray[np.uint8]:
         return np.frombuffer(self.text, dtype=np.uint8)[block.begin : block.end]
@@ -104,8 +110,9 @@ def read_deck(data: bytes) -> Deck:
     text = _blanked(data, comments) if comments else data
     keywords = [line for line in starred if not data.startswith(b"**", line[1])]
     deck = Deck(text, *_blocks(text, keywords), bool(comments))
-    for block in deck.blocks:
-        if block.keyword in _GENERATING:
+    for i, block in enumerate(deck.blocks):
+        in_step = any(one.keyword == "STEP" for one in deck.blocks[:i]) if block.keyword == "INCLUDE" else False
+        if block.keyword in _GENERATING and not in_step:  # loads may come from other files, the mesh may not
             raise ReadError(f"uses *{block.keyword}, which meshfix does not read")
         if block.keyword in MESH and "INPUT" in block.parameters:
             raise ReadError(f"uses *{block.keyword} with INPUT=, which meshfix does not read")
@@ -166,5 +173,10 @@ def _keyword(line: str) -> tuple[str, dict[str, str]]:
     """Return the keyword of a line and its parameters."""
     keyword, *others = line.strip()[1:].split(",")
     pairs = (other.partition("=") for other in others)
-    parameters = {" ".join(name.upper().split()): value.strip().strip("\"'") for name, _, value in pairs}
+    parameters = {_spelled("".join(name.upper().split())): value.strip().strip("\"'") for name, _, value in pairs}
     return " ".join(keyword.upper().split()), parameters
+
+
+def _spelled(name: str) -> str:
+    """Return the parameter that a name of three letters or more begins, or the name."""
+    return next((one for one in _PARAMETERS if len(name) > 2 and one.startswith(name)), name)

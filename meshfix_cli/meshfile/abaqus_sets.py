@@ -104,12 +104,15 @@ def _sets(deck: Deck, owner: str, keyword: str, labels: Labels) -> tuple[Sets, d
     """Read the sets of one kind; return sorted rows, and a name for each that no other has."""
     found: dict[tuple[str, str], list[NDArray[np.int64]]] = {}
     names: dict[tuple[str, str], str] = {}
+    taken: set[str] = set()
     for block in deck.of(owner, keyword):
         if name := block.parameters.get(keyword):
             key = block.scope, name.upper()
             rows = [labels.rows[block]] if block.keyword == owner else _members(deck, block, labels, found)
             found.setdefault(key, []).extend(rows)
-            names.setdefault(key, f"{block.scope or 'ASSEMBLY'} {name}" if name in names.values() else name)
+            if key not in names:
+                names[key] = f"{block.scope or 'ASSEMBLY'} {name}" if name in taken else name
+                taken.add(names[key])
     return {key: _rows(parts) for key, parts in found.items()}, names
 
 
@@ -132,10 +135,14 @@ def _members(
         return [labels.rows_of(scope, integers_at(deck.text, deck.words(block)))]
     members = []
     for word in dict.fromkeys(re.split(r"[,\n]", text.decode("latin-1").upper())):
-        instance, _, name = word.strip().strip("\"'").rpartition(".")
+        whole = word.strip().strip("\"'")
+        instance, _, name = whole.rpartition(".")
         there = deck.instances.get(instance, instance) if instance else scope
-        if _NUMBER.fullmatch(name.encode()):
+        if _NUMBER.fullmatch(name.encode()) and (scope, whole) not in found:
             members.append(labels.rows_of(there, np.array([int(name)])))
-        else:
-            members.append(_rows(found.get((there, name), [])))
+        else:  # a name may have a dot in it
+            parts = found.get((scope, whole), found.get((there, name)))
+            if parts is None and block.keyword == "ELSET" and whole not in ("", block.parameters["ELSET"].upper()):
+                raise ReadError(f"*ELSET names the element set {whole}, and there is none")  # it may hide a material
+            members.append(_rows(parts or []))
     return members

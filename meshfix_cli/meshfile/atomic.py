@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 import sys
@@ -20,12 +21,14 @@ def check_target(target: str) -> None:
     path = Path(target)
     if path.is_dir():
         raise WriteError(f"{target}: is a directory")
-    if _is_special(path):
+    if is_stream(target):
         return
     if not path.resolve().parent.is_dir():
         raise WriteError(f"{target}: the directory does not exist")
     if not os.access(path.resolve().parent, os.W_OK):
         raise WriteError(f"{target}: the directory is not writable")
+    if path.exists() and not os.access(path, os.W_OK):  # a rename would not ask
+        raise WriteError(f"{target}: is not writable")
 
 
 def write_file(target: str, produce: Callable[[Path], object], backup: bool = False) -> None:
@@ -34,7 +37,7 @@ def write_file(target: str, produce: Callable[[Path], object], backup: bool = Fa
     The temporary file is in a folder of its own beside the target, so the replacement is one rename; symbolic
     links are followed and the mode of an existing file is kept. With `backup` that file stays as `target.bak`.
     """
-    streamed = target == "-" or _is_special(Path(target))
+    streamed = is_stream(target)
     path = Path(target) if streamed else Path(target).resolve()
     try:
         with tempfile.TemporaryDirectory(prefix=".meshfix-", dir=None if streamed else path.parent) as folder:
@@ -50,7 +53,13 @@ def write_file(target: str, produce: Callable[[Path], object], backup: bool = Fa
     except BrokenPipeError:  # nobody reads stdout any more: the command line knows what that means
         raise
     except OSError as error:
-        raise WriteError(f"{target}: {error.strerror or error}") from error
+        name = "<stdout>" if target == "-" else target
+        raise WriteError(f"{name}: {error.strerror or error}") from error
+
+
+def write_text(target: str, text: str) -> None:
+    """Write a small file as `write_file` does."""
+    write_file(target, lambda temporary: temporary.write_text(text))
 
 
 def _replace(temporary: Path, path: Path, backup: bool) -> None:
@@ -60,12 +69,13 @@ def _replace(temporary: Path, path: Path, backup: bool) -> None:
     if backup and path.exists():
         _keep(path)
     temporary.replace(path)
-    if os.name == "posix":  # the rename itself is on the disk only when its folder is
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
+    if os.name == "posix":  # the rename is done; what is left is that a crash of the machine does not undo it
+        with contextlib.suppress(OSError):
+            folder = os.open(path.parent, os.O_RDONLY)
+            try:
+                os.fsync(folder)
+            finally:
+                os.close(folder)
 
 
 def _keep(path: Path) -> None:
@@ -84,6 +94,6 @@ def _umask() -> int:
     return mask
 
 
-def _is_special(path: Path) -> bool:
-    """A pipe or a device: written to, never replaced."""
-    return path.exists() and not path.is_file()
+def is_stream(target: str) -> bool:
+    """Whether a target is stdout, a pipe or a device: written to, never replaced."""
+    return target == "-" or (Path(target).exists() and not Path(target).is_file())

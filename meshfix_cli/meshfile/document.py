@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -90,6 +91,11 @@ class Document:
             ranked.append(((inverted, -smallest), mesh))
         return min(ranked, key=lambda pair: pair[0])[1]
 
+    def is_file(self, target: str) -> bool:
+        """Whether a target is the file that was read, under whatever name."""
+        here, there = Path(self.name), Path(target)
+        return target != "-" and here.is_file() and there.is_file() and here.samefile(there)
+
     def is_kept_by(self, form: Format) -> bool:
         """Whether writing in a format keeps all but the coordinates, byte for byte."""
         return form == self.format and self.source.layout is not None
@@ -133,7 +139,9 @@ def build(name: str, source: Source, form: Format, fix: str | None, regions: str
         mesh = mesh.with_fixed(mask)
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
     seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
-    notes = _notes(mesh, len(simplices), seen_from_above)
+    notes = (*source.notes, *_notes(mesh, len(simplices), seen_from_above))
+    if dimension == 2 and any(run.type == "triangle_strip" for run in source.cells):
+        notes += ("strips of triangles are held where they are, and not judged",)
     return Document(name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, basis)
 
 
@@ -260,13 +268,15 @@ def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
         notes.append(f"{repeated} of another and not counted")
     isolated = topology.n - int(topology.used.sum())
     if isolated:
-        notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and stay as they are")
-    mirrored = int(topology.mirrored.sum())
+        notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
+    mirrored, which = int(topology.mirrored.sum()), ""
     if mirrored == len(topology.simplices) and seen_from_above:
-        notes.append("the elements are numbered the other way round (mirrored); solved so, the numbering is kept")
+        which = "the elements are"
     elif 0 < mirrored < len(topology.simplices):
-        separate = counted(mirrored, f"{one} in a separate part is", f"{many} in separate parts are")
-        notes.append(f"{separate} numbered the other way round (mirrored); solved so, the numbering is kept")
+        which = counted(mirrored, f"{one} in a separate part is", f"{many} in separate parts are")
+    if which:
+        kept = "solved so, and the numbering is kept; --fix-orientation would turn it"
+        notes.append(f"{which} numbered the other way round (mirrored): {kept}")
     if not mesh.movable.any():
         notes.append("no vertex is free to move")
     return tuple(notes)

@@ -17,6 +17,7 @@ _EXTENSIONS = {f".{name}": name for name in ("obj", "ply", "stl", "vtk", "vtu")}
     ".mesh": "medit",
     ".msh": "gmsh22",
 }
+ENDLESS = ("tecplot", "wkt")  # meshio reads truncated files of these for ever
 BOTH = ("gmsh", "gmsh22", "ply", "stl", "vtk", "vtk42", "vtu")  # written as text or binary
 
 
@@ -42,20 +43,20 @@ def sniff(data: bytes) -> Format | None:
     if text.startswith("# vtk DataFile"):
         version = re.match(r"# vtk DataFile Version (\d+)", text)
         old = version is not None and int(version[1]) < 5
-        lines = text.splitlines()
+        lines = text.split("\n", 3) if "\n" in text else text.split("\r", 3)
         return Format("vtk42" if old else "vtk", len(lines) > 2 and lines[2].strip().upper() == "BINARY")
     if "$MeshFormat" in text:
         fields = text.split("$MeshFormat", 1)[1].split()
         return Format("gmsh22" if fields[:1] and fields[0].startswith("2") else "gmsh", fields[1:2] == ["1"])
     if text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin")):
         if re.search(r"<VTKFile[^>]*\stype\s*=\s*[\"']UnstructuredGrid", text):
-            return Format("vtu", 'format="ascii"' not in text)
+            return Format("vtu", re.search(r"format\s*=\s*[\"']ascii", text) is None)
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
     if text.startswith("ply"):
         return Format("ply", "format ascii" not in text)
     if re.match(r"solid\b.*\bfacet\b", text, re.IGNORECASE | re.DOTALL):
         return Format("stl", False)
-    if re.match(r"(#.*\s+)*MeshVersionFormatted\b", text):
+    if re.match(r"(#.*\n\s*)*MeshVersionFormatted\b", text):
         return Format("medit")
     for start, name in (("OFF", "off"), ("NDIME", "su2")):
         if text.startswith(start):
@@ -70,12 +71,14 @@ def sniff(data: bytes) -> Format | None:
 def missing_part(data: bytes, form: Format, cells: int) -> str | None:
     """Say what a file announces but does not hold; meshio reads some truncated files without a word.
 
-    `cells` is the number of cells that were read.
+    `cells` is the number of cells that were read, or -1 before they are.
     """
-    if form.reader == "gmsh":
-        for section in (b"Nodes", b"Elements"):
-            if data.find(b"$" + section) >= 0 > data.find(b"$End" + section):
-                return f"the section ${section.decode()} does not end"
+    if form.name == "permas" and b"$FIN" not in data:
+        return "it does not end with $FIN"
+    if form.name == "mdpa" and len(re.findall(rb"(?m)^Begin ", data)) != len(re.findall(rb"(?m)^End ", data)):
+        return "a block does not end"
+    if cells < 0:
+        return None
     found = re.search(rb"NELEM\s*=\s*(\d+)", data) if form.name == "su2" else None
     if found and cells < int(found[1]):
         return f"it announces {int(found[1]):,} cells and holds {cells:,}"
@@ -89,7 +92,7 @@ def by_name(path: Path) -> Format | None:
         return Format(_EXTENSIONS[suffix])
     import meshio
 
-    names = meshio.extension_to_filetypes.get(suffix, [])
+    names = [name for name in meshio.extension_to_filetypes.get(suffix, []) if name not in ENDLESS]
     return Format(names[0]) if names else None
 
 
@@ -98,7 +101,7 @@ def writers() -> tuple[str, ...]:
     import meshio
 
     both = set(meshio._helpers._writer_map) & set(meshio._helpers.reader_map)
-    return tuple(sorted(both - {"tetgen"} | {"gmsh22", "vtk42"}))
+    return tuple(sorted(both - {"tetgen", *ENDLESS} | {"gmsh22", "vtk42"}))
 
 
 def options(form: Format) -> dict[str, object]:

@@ -36,9 +36,18 @@ def parse(data: bytes) -> Source | None:
     find = _finder(tags)
     cells = [Cells(TYPES[block.kind][0], _vertices(block, find), block.ids) for block in file.blocks]
     labels = _labels(file)
-    layout = InPlace(data, coordinates, [block.corners for block in file.blocks])
-    load = partial(_load, file, tags, cells, labels)
-    return Source(coordinates.read(data), cells, layout, load, _regions(cells, labels), untold=tuple(file.untold))
+    by_corner = "section $ElementNodeData" in file.untold
+    layout = InPlace(data, coordinates, [_refuse if by_corner else block.corners for block in file.blocks])
+    load, regions = partial(_load, file, tags, cells, labels), _regions(cells, labels)
+    for what, numbers in (("nodes", tags), ("elements", np.concatenate([block.ids for block in file.blocks]))):
+        if not np.array_equal(numbers, np.arange(1, len(numbers) + 1)):
+            file.untold[f"numbers of {what}"] = None
+    notes = ("the parameters (u, v) of nodes on curves and faces stay as they are",) * file.parametric
+    return Source(coordinates.read(data), cells, layout, load, regions, untold=tuple(file.untold), notes=notes)
+
+
+def _refuse() -> Places:
+    raise ReadError("has data for the corners of elements, which would be those of others if elements were renumbered")
 
 
 def _finder(tags: Int64) -> Callable[[Int64], Int64]:
@@ -76,12 +85,9 @@ def _joined(places: Sequence[Places]) -> Places:
 
 def _labels(file: File) -> dict[str, list[Int64]]:
     """Entities and physical groups of the elements; where an entity is in several, also a number for each set."""
-    sets = [
-        file.groups.get((block.dimension, int(block.entities[0])), ()) if block.physical is None else ()
-        for block in file.blocks
-    ]
+    sets = [file.groups.get((block.dimension, int(block.entities[0])), ()) for block in file.blocks]
     physical = [
-        np.full(len(block.ids), groups[0] if groups else 0) if block.physical is None else block.physical
+        np.full(len(block.ids), (*groups, 0)[0]) if block.physical is None else block.physical
         for block, groups in zip(file.blocks, sets, strict=True)
     ]
     labels = {_ENTITY: [block.entities for block in file.blocks]}

@@ -93,7 +93,7 @@ class Text(Numbers):
         ends = self.at + np.flatnonzero(np.frombuffer(self.data, np.uint8, offset=self.at) == ord("\n"))[:count]
         starts = np.array([self.at, *(ends[:-1] + 1)])
         spans = line_words(self.data, starts, 4)
-        if len(ends) < count or (spans < 0).any():
+        if not 0 < count == len(ends) or (spans < 0).any():
             raise ReadError("is truncated or damaged: $ParametricNodes has not a line of numbers for each node")
         self.at = int(ends[-1])
         return integers_at(self.data, spans[:, 0]), Places.of_text(spans[:, 1:])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -62,6 +62,8 @@ class File:
         Sections of data, by the name of the section, and what reads their numbers.
     untold : dict
         What no other format holds.
+    parametric : bool
+        Whether nodes have parameters of the curve or face on which they lie.
     """
 
     tags: list[Int64] = field(default_factory=list)
@@ -71,6 +73,7 @@ class File:
     names: dict[str, Any] = field(default_factory=dict)
     views: list[tuple[str, Numbers]] = field(default_factory=list)
     untold: dict[str, None] = field(default_factory=dict)
+    parametric: bool = False
 
 
 def read(data: bytes) -> File:
@@ -96,6 +99,8 @@ def read(data: bytes) -> File:
             at = _behind(data, numbers.at, name)
             continue
         begin, at = at, data.find(b"\n$End" + match[1], at - 1)
+        if at < 0 and numbers is None and name not in ("MeshFormat", "Comments"):
+            break
         if at < 0:
             raise ReadError(f"is truncated: the section ${name} does not end")
         if name == "MeshFormat":
@@ -109,7 +114,9 @@ def read(data: bytes) -> File:
             file.views.append((name, replace(numbers, at=begin)))
         at += 1
     if numbers is None:
-        raise ReadError("is not a readable gmsh file: it has no $MeshFormat")
+        raise ReadError(
+            "is not a readable gmsh file: it has no $MeshFormat, as those of version 1; save it as 2.2 or 4.1"
+        )
     return file
 
 
@@ -126,7 +133,9 @@ def _format(data: bytes, at: int) -> tuple[Numbers, _Readers]:
     if match is None:
         raise ReadError("is not a readable gmsh file: $MeshFormat does not tell a version, a type and a size")
     version, binary, size = float(match[1]), match[2] == b"1", int(match[3][:9])
-    if not (2 <= version < 3 or version == 4.1) or (binary and size not in ((8,) if version < 3 else (4, 8))):
+    if not (2 <= version < 3 or version == 4.1):
+        raise ReadError(f"is of gmsh's version {match[1].decode()}, which is not read: save it as 2.2 or 4.1")
+    if binary and size not in ((8,) if version < 3 else (4, 8)):
         raise UnknownError
     readers = _READERS[int(version)]
     if not binary:
@@ -146,6 +155,7 @@ def _nodes_2(numbers: Numbers, file: File) -> None:
 
 def _parametric_nodes_2(numbers: Numbers, file: File) -> None:
     """Read their number, and for each tag, x, y, z, dimension and entity, and one parameter on curves, two on faces."""
+    file.parametric = True
     tags, places = numbers.parametric(numbers.count())
     file.tags.append(tags)
     file.coordinates.append(places)
@@ -158,6 +168,7 @@ def _nodes_4(numbers: Numbers, file: File) -> None:
         if dimension not in range(4) or parametric not in (0, 1):
             raise ReadError("is not a readable gmsh file: a block of $Nodes has no header")
         count = int(numbers.sizes(1)[0])
+        file.parametric |= bool(parametric)
         file.tags.append(numbers.sizes(count))
         file.coordinates.append(numbers.coordinates(count, 3 + dimension * parametric))
 
@@ -181,22 +192,22 @@ def _elements_2(numbers: Numbers, file: File) -> None:
     The labels are a physical group, an entity, and partitions.
     """
     count = numbers.count()
-    base, flat = numbers.at, numbers.all_integers()
-    records = np.array(list(_records_2(flat, count, numbers.binary)), dtype=np.int64).reshape(-1, 6)
-    used = int(records[-1, 2] + records[-1, 3] * records[-1, 5]) if len(records) else 0
+    base, flat, own = numbers.at, numbers.all_integers(), int(numbers.binary)
+    heads, used = _heads(flat, count, numbers.binary)
     if numbers.binary:
         numbers.at += 4 * used
     elif used < len(flat):
         raise ReadError(f"is not a readable gmsh file: $Elements announces {count:,} elements and holds more")
-    for kind in dict.fromkeys(records[:, 0].tolist()):
-        _, labels, at, same, together, step = records[records[:, 0] == kind].T
+    kinds = flat[heads + 1 - own]
+    for kind in dict.fromkeys(kinds.tolist()):
+        begin, size = heads[kinds == kind], _nodes_of(kind)
+        together = flat[begin + 1].astype(np.int64) if own else np.ones_like(begin)
+        labels = flat[begin + 2].astype(np.int64)
         if labels.max() > 2:
             file.untold["partitions"] = None
-        size, own = _nodes_of(kind), int(numbers.binary)  # in binary the tag stands behind the head
-        begin = _spread(at, same, step)
-        width = np.repeat(own + labels + size, same)
-        labels = np.repeat(labels, same * together)
-        first = _spread(begin, np.repeat(together, same), width) + 3 + own + labels
+        # In binary the tag stands behind the head.
+        first = _spread(begin, together, own + labels + size) + 3 + own + np.repeat(labels, together)
+        labels = np.repeat(labels, together)
         ids = flat[first - labels - 3 + 2 * own].astype(np.int64)
         nodes = flat[first[:, None] + np.arange(size)].astype(np.int64)
         physical, entities = (
@@ -206,44 +217,25 @@ def _elements_2(numbers: Numbers, file: File) -> None:
         file.blocks.append(Block(kind, ids, nodes, entities, physical, -1, corners))
 
 
-def _records_2(flat: NDArray[Any], count: int, binary: bool) -> Iterator[tuple[int, int, int, int, int, int]]:
-    """Cut integers into records, which are an element in text, and elements behind a head in binary.
-
-    Those in a row that have the same head come together: type, number of labels, begin, number of records, number of
-    elements in each, and length of each.
-    """
-    at, left = 0, count
+def _heads(flat: NDArray[Any], count: int, binary: bool) -> tuple[Int64, int]:
+    """Where the heads of elements stand, and where the last of them ends; in text each element has its own."""
+    numbers, heads, at, left = flat.astype(flat.dtype.newbyteorder("=")).data, [], 0, count
     while left > 0:
-        head = flat[at : at + 3].tolist()
-        if len(head) < 3:
+        if at + 3 > len(numbers):
             raise _too_few(count, left)
-        kind, together, labels = head if binary else (head[1], 1, head[2])
-        step = 3 + together * (int(binary) + labels + _nodes_of(kind))
-        if labels < 0 or not 0 < together <= left or step > len(flat) - at:
+        kind, together, labels = numbers[at], numbers[at + 1], numbers[at + 2]
+        if not binary:
+            kind, together = together, 1
+        step = 3 + together * (binary + labels + _nodes_of(kind))
+        if labels < 0 or not 0 < together <= left or step > len(numbers) - at:
             raise _too_few(count, left)
-        same = min(_alike(flat, at, step, 0 if binary else 1), left // together)
-        yield kind, labels, at, same, together, step
-        at, left = at + same * step, left - same * together
+        heads.append(at)
+        at, left = at + step, left - together
+    return np.array(heads, dtype=np.int64), at
 
 
 def _too_few(count: int, left: int) -> ReadError:
     return ReadError(f"is truncated: $Elements announces {count:,} elements and holds {count - left:,}")
-
-
-def _alike(flat: NDArray[Any], at: int, step: int, column: int) -> int:
-    """How many records in a row have the head of the first, from a column to the third; the work is as much."""
-    head, behind = (flat[i + column : i + 3].tolist() for i in (at, at + step))
-    known = 1
-    while head == behind:
-        rows = flat[at : at + 2 * known * step]
-        rows = rows[: len(rows) // step * step].reshape(-1, step)[:, column:3]
-        same = (rows == rows[0]).all(axis=1)
-        if not same.all():
-            return int(same.argmin())
-        if len(rows) < 2 * known:
-            return len(rows)
-        known *= 2
-    return 1
 
 
 def _spread(begin: Int64, count: Int64, step: Int64) -> Int64:

@@ -14,12 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import Cells, Source
+from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.text import Spans, first_words, in_line, integers_at, line_words
 
-_CONTINUED = re.compile(rb"\\[ \t]*[\r\n]")
+_CONTINUED = re.compile(rb"#[^\r\n]*|\\[ \t]*(?:\r\n|\r|\n)")  # or a comment, which is not
 _COMMA = re.compile(rb"(?:^|[\r\n])[ \t]*[vflp]\b[^\r\n#]*(,)")  # no part of a number, but the kernels end words there
+_NAME_END = re.compile(rb"[\r\n#]")
+MATERIAL = "obj:material"
 _UNTOLD = {
     "objects and groups": {b"o", b"g"}, "materials": {b"usemtl", b"mtllib"}, "smoothing groups": {b"s"},
     "texture coordinates": {b"vt"}, "normals": {b"vn"},
@@ -30,17 +32,20 @@ _TYPES = {(b"f", 3): "triangle", (b"f", 4): "quad", (b"l", 2): "line"}
 _LARGER = {b"f": "polygon", b"l": "polyline", b"p": "vertex"}
 
 
-def parse(data: bytes) -> Source | None:
-    """Read vertices, faces, lines and points; None where lines are continued by a backslash."""
-    if _CONTINUED.search(data):
-        return None
+def parse(data: bytes) -> Source:
+    """Read vertices, faces, lines and points."""
+    original = data
+    if b"\\" in data:
+        data = _CONTINUED.sub(lambda end: end[0] if end[0][:1] == b"#" else b" " * len(end[0]), data)
     comma = _COMMA.search(data) if b"," in data else None
     if comma:
         raise in_line(data, comma.start(1), "there is a comma between the numbers")
     ends, keywords = first_words(data)
     at = {keyword: ends[keywords == keyword] for keyword in (b"v", *_CORNERS)}
     coordinates = Places.of_text(_coordinates(data, at[b"v"]))
-    cells, corners = [], []
+    cells, corners, labels = [], [], []
+    uses = ends[keywords == b"usemtl"]
+    materials = _materials(data, uses)
     for keyword, minimum in _CORNERS.items():
         for rows, spans in _runs(data, at[keyword]):
             count = spans.shape[1]
@@ -50,10 +55,19 @@ def parse(data: bytes) -> Source | None:
             vertices = _vertices(data, spans, before, len(at[b"v"]))
             if keyword == b"p":  # as many cells as there are numbers
                 vertices, rows = vertices.reshape(-1, 1), np.repeat(rows, count)
+            labels.append(materials[np.searchsorted(uses, at[keyword][rows])])
             cells.append(Cells(_TYPES.get((keyword, count), _LARGER[keyword]), vertices, rows))
             corners.append(partial(Places.of_text, spans, "i8"))
     untold = _untold(data, coordinates, set(np.unique(keywords).tolist()))
-    return Source(coordinates.read(data), cells, InPlace(data, coordinates, corners), untold=untold)
+    layout, regions = InPlace(original, coordinates, corners), (MATERIAL,) if len(uses) else ()
+    load = lambda: Arrays(cell=dict.fromkeys(regions, labels))  # noqa: E731
+    return Source(coordinates.read(data), cells, layout, load, regions, untold=untold)
+
+
+def _materials(data: bytes, uses: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers of the materials: 0 before the first `usemtl`, then that of the name behind each."""
+    names = [_NAME_END.split(data[at : at + 999], 1)[0].strip() for at in uses.tolist()]
+    return np.concatenate([[0], 1 + np.unique(np.array(names, dtype="S"), return_inverse=True)[1]])
 
 
 def _coordinates(data: bytes, at: NDArray[np.int64]) -> Spans:
@@ -81,7 +95,7 @@ def _runs(data: bytes, at: NDArray[np.int64]) -> Iterator[tuple[NDArray[np.int64
 
 def _vertices(data: bytes, spans: Spans, before: NDArray[np.int64], n: int) -> NDArray[np.int64]:
     """Rows of the points: from 1 in the file, or negative, from the last vertex `before` the line."""
-    numbers = integers_at(data, spans)
+    numbers = integers_at(data, spans, slash=True)
     rows = np.where(numbers < 0, before[:, None] + numbers, numbers - 1)
     outside = (rows < 0) | (rows >= n)
     if outside.any():

@@ -250,6 +250,15 @@ class _Run(NamedTuple):
     positions: NDArray[np.int64]
     kind: np.dtype[Any]
 
+    @property
+    def by_corner(self) -> bool:
+        """Whether there are other lists, as those of texture coordinates are."""
+        return sum(one.listed for one in self.table.element.properties) > 1
+
+
+def _refuse() -> Places:
+    raise ReadError("has data for the corners of faces, which would be those of others if faces were renumbered")
+
 
 def parse(data: bytes) -> Source | None:
     """Read vertices, faces and edges; None where faces come as strips, or coordinates or corners are of odd types."""
@@ -264,7 +273,7 @@ def parse(data: bytes) -> Source | None:
         return None
     coordinates = _coordinates(vertex, axes)
     cells = [Cells(run.type, vertex.body.integers(run.positions, run.kind), run.rows) for run in runs]
-    corners = [partial(vertex.body.places, run.positions, run.kind) for run in runs]
+    corners = [_refuse if run.by_corner else partial(vertex.body.places, run.positions, run.kind) for run in runs]
     layout = InPlace(data, coordinates, corners)
     return Source(coordinates.read(data), cells, layout, lambda: _arrays(vertex, runs), untold=_untold(header))
 

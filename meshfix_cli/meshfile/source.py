@@ -14,8 +14,11 @@ from numpy.typing import NDArray
 
 from meshfix_cli.meshfile.splice import Points
 
-# Cell arrays that tell materials apart: those of gmsh, MEDIT and MED, under the names that meshio gives to them.
-REGIONS = ("gmsh:physical", "medit:ref", "cell_tags")
+# Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
+REGIONS = (
+    "gmsh:physical", "gmsh:physical_set", "medit:ref", "cell_tags", "abaqus:section", "obj:material", "stl:solid",
+    "MaterialIDs", "CellEntityIds", "RegionId",
+)  # fmt: skip
 
 
 _SOLID = re.compile(r"(?:VTK_[A-Z]+_)?(?:tetra|hexa|wedge|pyramid|penta|voxel|polyhedron)", re.IGNORECASE)
@@ -99,6 +102,8 @@ class Source:
         Points that the file itself declares as fixed.
     untold : tuple of str
         What the file holds beside `arrays`, and no other format would: comments, sections, keywords.
+    notes : tuple of str
+        What a user should know about the file, a sentence each.
     """
 
     points: Points
@@ -108,6 +113,7 @@ class Source:
     regions: tuple[str, ...] = ()
     held: NDArray[np.bool_] | None = None
     untold: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def arrays(self) -> Arrays:

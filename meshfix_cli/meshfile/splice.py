@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,28 +72,21 @@ class Places:
         end = self.begin + self.dtype.itemsize if self.end is None else self.end
         return np.stack([self.begin, end], axis=-1)
 
+    def at(self, index: Any) -> Places:
+        """Places of some of the numbers."""
+        return replace(self, begin=self.begin[index], end=None if self.end is None else self.end[index])
+
     def read(self, data: bytes) -> Any:
         """Return the numbers (n, k) in the machine's byte order; ReadError where there are none."""
         if self.end is not None:
             return numbers_at(data, self.spans, self.dtype)
         size, native = self.dtype.itemsize, self.dtype.newbyteorder("=")
-        if self.begin.size and not 0 <= self.begin.min() <= self.begin.max() <= len(data) - size:
+        if not self.begin.size:
+            return np.empty(self.begin.shape, native)
+        if not 0 <= self.begin.min() <= self.begin.max() <= len(data) - size:
             raise ReadError("is truncated: its numbers reach behind its end")
-        stride = self._stride()
-        if stride:
-            strides = (stride, size)
-            return np.ndarray(self.begin.shape, self.dtype, data, int(self.begin[0, 0]), strides).astype(native)
-        cells = self.begin.reshape(-1, 1) + np.arange(size)
-        values = np.frombuffer(data, dtype=np.uint8)[cells].view(self.dtype).reshape(self.begin.shape)
-        return values.astype(native)
-
-    def _stride(self) -> int:
-        """Bytes from a row to the next where all rows are alike and without gaps, else 0: a view needs no index."""
-        if self.begin.ndim != 2 or len(self.begin) < 2:
-            return 0
-        step = int(self.begin[1, 0] - self.begin[0, 0])
-        alike = (np.diff(self.begin[:, 0]) == step).all() and (np.diff(self.begin, axis=1) == self.dtype.itemsize).all()
-        return step if alike and step > 0 else 0
+        windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
+        return windows[self.begin].view(self.dtype)[..., 0].astype(native)
 
     def rounded(self, values: Points) -> Points:
         """Return numbers (n, k) as the file can hold them."""

@@ -63,18 +63,13 @@ class _Facets:
 
     def _exchanged(self, facets: NDArray[np.bool_]) -> Edits:
         """Exchange the first two corners of some facets, number by number."""
-
-        def pairs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
-            return offsets.reshape(-1, 3, 3)[facets, :2].transpose(0, 2, 1).reshape(-1, 2)
-
-        end = None if self.corners.end is None else pairs(self.corners.end)
-        places = replace(self.corners, begin=pairs(self.corners.begin), end=end)
-        return places.exchange(self.data, np.arange(len(places.begin)))
+        first = np.repeat(3 * np.flatnonzero(facets), 3)[:, None]
+        places = self.corners.at((first + np.arange(2), np.arange(len(first))[:, None] % 3))
+        return places.exchange(self.data, np.arange(len(first)))
 
     def _renewed(self, facets: NDArray[np.bool_], corners: Points) -> Edits:
         """Make the normals of some facets those of their corners (k, 3, 3)."""
-        end = None if self.normals.end is None else self.normals.end[facets]
-        places = replace(self.normals, begin=self.normals.begin[facets], end=end)
+        places = self.normals.at(facets)
         values = _normals(corners)
         try:
             with np.errstate(invalid="ignore"):
@@ -115,7 +110,7 @@ def _parse_text(data: bytes) -> Source:
     solids = ends[words == b"solid"]
     source = _source(data, normals, corners, corners.read(data))
     named = (line_words(data, solids, 1) >= 0).any()
-    cell = {"solid": [np.searchsorted(solids, begin) - 1]} if len(solids) > 1 else {}
+    cell = {"stl:solid": [np.searchsorted(solids, begin) - 1]} if len(solids) > 1 else {}
     load = lambda: Arrays(cell=cell)  # noqa: E731
     return replace(source, load=load, regions=tuple(cell), untold=("names of solids",) if named else ())
 

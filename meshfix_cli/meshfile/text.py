@@ -21,7 +21,7 @@ def words(data: bytes, at: int, count: int) -> Spans:
     ReadError
         The file ends before.
     """
-    spans = _kernels.find_words(data, np.array([at], dtype=np.int64), count, False)
+    spans = _kernels.find_words(data, np.array([at], dtype=np.int64), min(count, len(data) + 1), False)
     if len(spans) < count:
         raise in_line(data, at, f"{count:,} numbers are announced, and the file is truncated")
     return spans
@@ -55,10 +55,10 @@ def integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int64], int]:
     return values, end
 
 
-def integers_at(data: bytes, spans: Spans) -> NDArray[np.int64]:
-    """Return the integers (...) of words, up to a slash in them; ReadError where one is not an integer."""
+def integers_at(data: bytes, spans: Spans, slash: bool = False) -> NDArray[np.int64]:
+    """Return the integers (...) of words, if `slash` up to one; ReadError where one is not an integer."""
     flat = np.ascontiguousarray(spans.reshape(-1, 2))
-    values, bad = _kernels.integers(data, flat)
+    values, bad = _kernels.integers(data, flat, slash)
     if bad >= 0:
         raise _not_a_number(data, int(flat[bad, 0]), "an integer")
     return values.reshape(spans.shape[:-1])

@@ -22,39 +22,49 @@ from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset({"line", "triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"})
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
+_WITH_SETS = ("abaqus", "exodus")
 _SPATIAL = ("obj", "off", "ply", "stl")  # these have no plane meshes
 
 
-def read_bytes(data: bytes, form: Format) -> Source:
-    """Read a file, which meshio wants to be one on a disk."""
-    with tempfile.TemporaryDirectory(prefix="meshfix-") as folder:
-        path = Path(folder) / "stream"
-        path.write_bytes(data)
-        with _sentences(ReadError, f"is not a readable {form.name} file"):
-            mesh = meshio.read(path, file_format=form.reader)
-            missing = formats.missing_part(data, form, sum(len(block.data) for block in mesh.cells))
-            if missing:
-                raise ReadError(f"is truncated: {missing}")
-            return _source(mesh)
+def read(data: bytes, form: Format, path: Path | None = None) -> Source:
+    """Read a file, or, without a path, what came from a stream: meshio wants a file on a disk."""
+    if path is None:
+        with tempfile.TemporaryDirectory(prefix="meshfix-") as folder:
+            path = Path(folder) / "stream"
+            path.write_bytes(data)
+            return read(data, form, path)
+    with _sentences(ReadError, f"is not a readable {form.name} file", path):
+        _refuse(formats.missing_part(data, form, -1))
+        mesh = meshio.read(path, file_format=form.reader)
+        _refuse(formats.missing_part(data, form, sum(len(block.data) for block in mesh.cells)))
+        return _source(mesh)
 
 
-def write_path(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
+def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
     """Write as much of a source, with other points (n, d), as the format takes; WriteError where that is nothing."""
     simplex = "tetra" if any(run.type == "tetra" for run in source.cells) else "triangle"
     attempts = [(_KNOWN, source.arrays), (_COMMON, source.arrays), ({simplex}, source.arrays), ({simplex}, Arrays())]
     if form.name in _SPATIAL and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     for types, arrays in attempts:
+        kept = [i for i, run in enumerate(source.cells) if run.type in types and len(run.vertices)]
         try:
-            with _sentences(WriteError, f"cannot be written as {form.name}"):
-                kept = [i for i, run in enumerate(source.cells) if run.type in types and len(run.vertices)]
+            with _sentences(WriteError, f"cannot be written as {form.name}", path):
                 meshio.write(path, _mesh(source, points, arrays, kept, form), form.name, **formats.options(form))
             break
-        except WriteError:
-            if (types, arrays) == attempts[-1]:
-                raise
+        except WriteError as error:
+            last = error
+    else:
+        raise last
     if len(list(path.parent.iterdir())) > 1:
         raise WriteError(f"cannot be written as {form.name}: it takes more than one file")
+    if form.name == "abaqus":  # meshio's name of triangles is that of rigid elements
+        path.write_bytes(path.read_bytes().replace(b"TYPE=R3D3\n", b"TYPE=CPS3\n"))
+
+
+def _refuse(missing: str | None) -> None:
+    if missing:
+        raise ReadError(f"is truncated: {missing}")
 
 
 def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kept: list[int], form: Format) -> Any:
@@ -65,22 +75,30 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
             text = _MATERIALS.get(form.reader, text)
         return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
 
-    cell_sets = dict(arrays.cell_sets)
-    if form.name == "abaqus":
-        titles = {int(number): title for title, (number, _) in arrays.groups.items()}
-        for region in set(source.regions) & set(arrays.cell):
-            for label in np.unique(np.concatenate(arrays.cell[region])).tolist():
-                rows = [np.flatnonzero(values == label) for values in arrays.cell[region]]
-                cell_sets.setdefault(titles.get(label, f"REGION_{label}"), rows)
+    cell = {name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
+    holds_sets = form.name in _WITH_SETS
+    cell_sets = {**arrays.cell_sets, **_materials(source, arrays)} if holds_sets else {}
     return meshio.Mesh(
         points,
         [(source.cells[i].type, source.cells[i].vertices) for i in kept],
         point_data={name(key): values for key, values in arrays.point.items()},
-        cell_data={name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()},
+        # MEDIT files take the first array of integers.
+        cell_data=dict(sorted(cell.items(), key=lambda item: item[0] != "medit:ref")),
         field_data=dict(arrays.groups),
-        point_sets=dict(arrays.point_sets),
+        point_sets=dict(arrays.point_sets) if holds_sets else {},
         cell_sets={key: [runs[i] for i in kept] for key, runs in cell_sets.items()},
     )
+
+
+def _materials(source: Source, arrays: Arrays) -> dict[str, list[NDArray[np.int64]]]:
+    """For each material, by the name of its group, the rows of the cells in each run."""
+    titles = {int(number): title for title, (number, _) in arrays.groups.items()}
+    sets: dict[str, list[NDArray[np.int64]]] = {}
+    for region in (name for name in source.regions if name in arrays.cell):
+        for label in np.unique(np.concatenate(arrays.cell[region])).tolist():
+            rows = [np.flatnonzero(values == label) for values in arrays.cell[region]]
+            sets.setdefault(titles.get(label, f"REGION_{label}"), rows)
+    return sets
 
 
 def _source(mesh: Any) -> Source:
@@ -106,20 +124,26 @@ def _source(mesh: Any) -> Source:
 
 
 @contextlib.contextmanager
-def _sentences(kind: type[MeshfixError], what: str) -> Iterator[None]:
+def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None]:
     """Turn whatever meshio raises into one sentence; also its sys.exit, for which it prints the reason."""
     printed = io.StringIO()
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             yield
+        return
     except (MeshfixError, OSError):
         raise
+    except SystemExit as error:
+        if error.code not in (None, 1):  # that of a signal: meshio's is 1
+            raise
+        cause: BaseException = error
+        reason = printed.getvalue()
     except ImportError as error:
-        raise kind(f"{what}: that needs the package {error.name}") from error
-    except (Exception, SystemExit) as error:
-        said = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error).strip()
-        reason = " ".join(said.split())[:200] or f"{type(error).__name__} in meshio"
-        raise kind(f"{what} ({reason})") from error
+        cause, reason = error, f"that needs the package {error.name}"
+    except Exception as error:
+        cause, reason = error, str(error) or f"{type(error).__name__} in meshio"
+    reason = " ".join(reason.replace(str(path), "it").split())[:200]
+    raise kind(f"{what} ({reason})") from cause
 
 
 def _native(array: Any) -> Any:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.vtk_cells import TYPES, Run, runs
+from meshfix_cli.meshfile.vtk_cells import GHOSTS, TYPES, Run, ghosts, runs
 from meshfix_cli.meshfile.vtk_sections import Array, Sections, find_sections
 
 # The types of cells that polydata do not tell: that of any number of vertices, and those of some numbers.
@@ -42,9 +42,13 @@ def parse(data: bytes) -> Source | None:
     layout = InPlace(data, coordinates, [partial(table.places, run) for table, run in pairs])
     load = cache(partial(_arrays, found, points.tuples, [table.first + run.rows for table, run in pairs]))
     named = {array.name for array in found.arrays[b"cell_data"]}
-    regions = tuple(name for name in REGIONS if name in named and name in load().cell)
+    regions = tuple(name for name in REGIONS if name in named)
+    for name in (*regions, *GHOSTS & named):
+        if name not in load().cell:
+            raise ReadError(f"is not a readable vtk file: its cell data {name!r} cannot be read")
+    held = ghosts(load().cell, [run for _, run in pairs], points.tuples) if GHOSTS & named else None
     untold = dict.fromkeys(["field data"] * bool(found.arrays[b"dataset"]) + found.untold)
-    return Source(points.values().reshape(-1, 3), cells, layout, load, regions, untold=tuple(untold))
+    return Source(points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold))
 
 
 def promoted(data: bytes) -> bytes:
@@ -120,7 +124,7 @@ def _integers(array: Array) -> NDArray[np.int64]:
 def _starts(numbers: NDArray[np.int64], count: int, types: NDArray[np.int64] | None) -> NDArray[np.int64]:
     """Where, among numbers, stands that of the vertices of each cell."""
     each, rest = divmod(len(numbers), max(count, 1))
-    if each and not rest and (numbers[::each] == each - 1).all():
+    if count and each and not rest and (numbers[::each] == each - 1).all():
         return np.arange(0, len(numbers), each)
     if types is not None and len(types) == count:
         kinds, which = np.unique(types, return_inverse=True)

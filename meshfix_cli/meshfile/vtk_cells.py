@@ -5,7 +5,7 @@ Source: VTK, "vtkCellType.h".
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,6 +31,7 @@ TYPES = {
     80: ("VTK_BEZIER_WEDGE", 0), 81: ("VTK_BEZIER_PYRAMID", 0),
 }  # fmt: skip
 _ORDER = {13: [0, 2, 1, 3, 5, 4]}  # the wedge of meshio, from that of VTK, and back
+GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 _MOST_RUNS = 1000  # above, cells of a type are gathered from all over the file
 
 
@@ -79,11 +80,23 @@ def runs(types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivi
     for rows in _same(types, sizes):
         number, size = int(types[rows[0]]), int(sizes[rows[0]])
         name, expected = TYPES.get(number, (f"vtk{number}", 0))
+        if name == "polygon" and size == 3:
+            name = "triangle"
         if expected not in (0, size):
             raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {size} vertices")
         at = offsets[rows][:, None] + np.array(_ORDER.get(number, range(size)), dtype=np.int64)
         found.append(Run(name, rows, connectivity[at]))
     return found
+
+
+def ghosts(cell: Mapping[str, Sequence[NDArray[Any]]], found: Sequence[Run], n: int) -> NDArray[np.bool_]:
+    """Mark the vertices of cells that another piece, or another file, has as well."""
+    held = np.zeros(n, dtype=bool)
+    for name in GHOSTS & cell.keys():
+        for run, marks in zip(found, cell[name], strict=True):
+            vertices = run.vertices[marks != 0]
+            held[vertices[(vertices >= 0) & (vertices < n)]] = True
+    return held
 
 
 def _same(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> Sequence[NDArray[np.int64]]:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.source import REGIONS
 from meshfix_cli.meshfile.splice import Places
 from meshfix_cli.meshfile.text import integers, numbers_at, words
 
@@ -163,6 +164,7 @@ class Sections:
         place: bytes = b"dataset"
         tuples: int | None = None
         while keyword := self._peek():
+            start = self.at
             self._word()
             try:
                 if keyword in (b"point_data", b"cell_data"):
@@ -172,6 +174,11 @@ class Sections:
             except Odd:
                 if place == b"dataset":
                     raise
+                if not self.data[self.at :].strip():
+                    raise ReadError("is truncated: it ends within its data") from None
+                if any(name.encode() in self.data[start:] for name in REGIONS):
+                    raise
+                self.untold.append("data that cannot be read")
                 return
 
     def _geometry(self, keyword: bytes) -> bool:
@@ -199,7 +206,8 @@ class Sections:
 
     def _attribute(self, keyword: bytes, tuples: int | None) -> list[Array]:
         if tuples is None or keyword not in _ATTRIBUTES:
-            raise Odd(f"is not a readable vtk file: {_shown(keyword)} stands where a keyword is expected")
+            error = ReadError if keyword[:1] in b"+-.0123456789" else Odd  # more numbers than were announced
+            raise error(f"is not a readable vtk file: {_shown(keyword)} stands where a keyword is expected")
         name = self._word()
         if keyword == b"lookup_table":
             self.untold.append("lookup tables")

@@ -22,32 +22,31 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import REGIONS, Arrays, Source
 from meshfix_cli.meshfile.splice import Points, differing
 from meshfix_cli.meshfile.vtk_arrays import Payload
-from meshfix_cli.meshfile.vtk_cells import Run, runs
+from meshfix_cli.meshfile.vtk_cells import GHOSTS, Run, ghosts, runs
 from meshfix_cli.meshfile.vtk_xml import Element, XmlFile
 
 
-def parse(data: bytes) -> Source | None:
-    """Read points and cells of all pieces.
-
-    None: another kind of data set, points that change in time or are not all in float32 or all in float64, arrays
-    that share bytes.
-    """
+def parse(data: bytes) -> Source:
+    """Read points and cells of all pieces."""
     file = XmlFile.parse(data)
     pieces = _pieces(file)
     shares = [_Share(piece.only("Points"), 3 * piece.before, 3 * piece.points) for piece in pieces if piece.points]
     kinds = {(share.array.kind, share.array.attributes.get("NumberOfComponents")) for share in shares}
     if kinds not in ({("f4", "3")}, {("f8", "3")}):
-        return None
+        raise ReadError("is not a readable vtu file: its points are not three Float32, or three Float64, each")
     cells = _cells(file, pieces)
     if any(file.shares(share.array) for share in (*shares, *cells.shares)):
-        return None
+        raise ReadError("has points or vertices that share their bytes with another array, which meshfix does not read")
     points = np.concatenate([file.numbers(share.array, share.size).read() for share in shares]).reshape(-1, 3)
     found = runs(cells.types, cells.offsets, cells.connectivity)
     layout = _Layout(file, points.dtype, shares, cells.shares, [cells.offsets[run.rows] for run in found])
     load = cache(lambda: _arrays(file, pieces, found))
     labels = {array.name for piece in pieces for array in piece.arrays("CellData")}
-    regions = tuple(name for name in REGIONS if name in labels and name in load().cell)
-    return Source(points, [run.cells for run in found], layout, load, regions, untold=_untold(file, pieces))
+    regions = tuple(name for name in REGIONS if name in labels)
+    for name in labels & {*REGIONS, *GHOSTS} - load().cell.keys() if labels & {*REGIONS, *GHOSTS} else ():
+        raise ReadError(f"is not a readable vtu file: its cell data {name!r} are damaged, or not those of all pieces")
+    held = ghosts(load().cell, found, len(points)) if labels & GHOSTS else None
+    return Source(points, [run.cells for run in found], layout, load, regions, held, _untold(file, pieces))
 
 
 def promoted(data: bytes) -> bytes:
@@ -149,11 +148,12 @@ class _Layout:
 
 
 def _pieces(file: XmlFile) -> list[_Piece]:
-    """Return the pieces; none where it is not a grid at one point in time."""
-    grids = file.root.named("UnstructuredGrid") if file.root.tag == "VTKFile" else []
+    grids = file.root.named("UnstructuredGrid")
+    if file.root.tag != "VTKFile" or len(grids) != 1:
+        raise ReadError("is not a readable vtu file: it holds no unstructured grid")
     pieces: list[_Piece] = []
     before = 0
-    for element in grids[0].named("Piece") if len(grids) == 1 and "TimeValues" not in grids[0].attributes else ():
+    for element in grids[0].named("Piece"):
         pieces.append(_Piece(element, element.count("NumberOfPoints"), element.count("NumberOfCells"), before))
         before += pieces[-1].points
     return pieces

@@ -10,6 +10,7 @@ import meshio
 import numpy as np
 import pytest
 from conftest import SAMPLES, tangle
+from programs import gmsh_session
 from scipy.spatial.transform import Rotation
 
 from meshfix_cli import read, summarise, untangle, write
@@ -329,6 +330,26 @@ def test_what_a_format_cannot_hold_is_named(tmp_path: Path) -> None:
     lost = ("line cells", "vertex cells", "point data a b", "comments")
     assert write(rich, rich.mesh, tmp_path / "out.obj")[1] == lost
     assert write(rich, rich.mesh, tmp_path / "out.vtk")[1] == lost[-1:]
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_fields_survive_in_gmsh_files(tmp_path: Path, plate: Mesh, binary: bool) -> None:
+    """gmsh itself reads what meshio has written."""
+    n, m = plate.topology.n, len(plate.topology.simplices)
+    arrays = {"t": np.linspace(0, 1, n), "v": np.arange(3.0 * n).reshape(n, 3) / 7}
+    points = np.column_stack([plate.points, np.zeros(n)])
+    mesh = meshio.Mesh(points, [("triangle", plate.topology.simplices)], arrays, {"mat": [np.arange(m) % 4]})
+    mesh.write(tmp_path / "in.vtk", binary=binary)
+    document = read(tmp_path / "in.vtk")
+    assert write(document, document.mesh, tmp_path / "out.msh")[1] == ()
+    after = read(tmp_path / "out.msh").source.arrays
+    np.testing.assert_array_equal(np.concatenate(after.cell["mat"]), np.arange(m) % 4)
+    for name, values in arrays.items():
+        np.testing.assert_array_equal(after.point[name], values)
+    with gmsh_session() as gmsh:
+        gmsh.open(str(tmp_path / "out.msh"))
+        views = [gmsh.view.getModelData(tag, 0) for tag in gmsh.view.getTags()]
+    assert sorted(len(data) for _, _, data, _, _ in views) == sorted([n, n, m])
 
 
 def test_msh_keeps_its_version(tmp_path: Path) -> None:

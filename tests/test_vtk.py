@@ -168,6 +168,12 @@ def test_labels_of_materials_are_regions(tmp_path: Path) -> None:
         parsed(broken)
 
 
+def test_arrays_that_cannot_be_read_are_named() -> None:
+    data = fan("POINT_DATA 5\nSCALARS big vtktypeuint64 1\nLOOKUP_TABLE default\n1 2 3 4 18446744073709551615")
+    arrays = parsed(data).arrays
+    assert (arrays.point, arrays.unread) == ({}, ("point data big",))
+
+
 def test_a_name_with_blanks_can_be_asked_for(tmp_path: Path) -> None:
     (tmp_path / "a.vtk").write_bytes(
         fan("POINT_DATA 5\nSCALARS do%20not%20move int 1\nLOOKUP_TABLE default\n0 0 0 0 1")

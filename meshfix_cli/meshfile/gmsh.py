@@ -109,7 +109,8 @@ def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> t
 
 
 def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, list[Int64]]) -> Arrays:
-    """Labels and views; a view that cannot be read is left out."""
+    """Labels and views."""
+    unread = []
     point: dict[str, Any] = {}
     cell: dict[str, Any] = dict(labels)
     ends = np.cumsum([len(run.vertices) for run in cells])
@@ -119,10 +120,11 @@ def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, 
         try:
             name, step, values = _view(numbers, wanted)
         except ReadError:
+            unread.append(f"a section ${section} that cannot be read")
             continue
         name = f"{name} step {step}" if name in arrays else name
         arrays[name] = values if section == "NodeData" else np.split(values, ends[:-1])
-    return Arrays(point, cell, file.names)
+    return Arrays(point, cell, file.names, unread=tuple(unread))
 
 
 def _view(numbers: Numbers, wanted: Int64) -> tuple[str, int, NDArray[np.float64]]:

@@ -64,6 +64,8 @@ class Arrays:
         Rows of points for each name.
     cell_sets : dict
         For each name the rows of cells in each run.
+    unread : tuple of str
+        What is there and cannot be read.
     """
 
     point: Mapping[str, NDArray[Any]] = field(default_factory=dict)
@@ -71,6 +73,7 @@ class Arrays:
     groups: Mapping[str, Any] = field(default_factory=dict)
     point_sets: Mapping[str, Any] = field(default_factory=dict)
     cell_sets: Mapping[str, Any] = field(default_factory=dict)
+    unread: tuple[str, ...] = ()
 
 
 class Layout(Protocol):
@@ -162,7 +165,7 @@ class Source:
                 lost.append(f"cell data {name}")
         held = {*theirs.groups, *theirs.point_sets, *theirs.cell_sets}
         lost += [f"group {name}" for name in (*mine.groups, *mine.point_sets, *mine.cell_sets) if name not in held]
-        return (*dict.fromkeys(lost), *self.untold)
+        return (*dict.fromkeys((*lost, *mine.unread)), *self.untold)
 
 
 def _joined(parts: Sequence[Any]) -> Any:

@@ -75,13 +75,19 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
             text = _MATERIALS.get(form.reader, text)
         return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
 
-    cell = {name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
+    def values(key: str, array: Any) -> Any:
+        if form.reader == "gmsh" and not form.binary and not key.startswith("gmsh:"):
+            return np.asarray(array, dtype=np.float64).astype(object)  # meshio writes the repr, "np.float64(1.0)"
+        return array
+
+    names = {key: name(key) for key in (*arrays.cell, *arrays.point)}
+    cell = {names[key]: [values(names[key], runs[i]) for i in kept] for key, runs in arrays.cell.items()}
     holds_sets = form.name in _WITH_SETS
     cell_sets = {**arrays.cell_sets, **_materials(source, arrays)} if holds_sets else {}
     return meshio.Mesh(
         points,
         [(source.cells[i].type, source.cells[i].vertices) for i in kept],
-        point_data={name(key): values for key, values in arrays.point.items()},
+        point_data={names[key]: values(names[key], array) for key, array in arrays.point.items()},
         # MEDIT files take the first array of integers.
         cell_data=dict(sorted(cell.items(), key=lambda item: item[0] != "medit:ref")),
         field_data=dict(arrays.groups),

@@ -171,11 +171,12 @@ def _of_polyhedron(faces: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _arrays(found: Sections, points: int, rows: Sequence[NDArray[np.int64]]) -> Arrays:
-    cell = _readable(found.arrays[b"cell_data"], sum(map(len, rows)))
-    return Arrays(
-        dict(_readable(found.arrays[b"point_data"], points)),
-        {name: [values[here] for here in rows] for name, values in cell},
-    )
+    point = dict(_readable(found.arrays[b"point_data"], points))
+    cell = dict(_readable(found.arrays[b"cell_data"], sum(map(len, rows))))
+    unread = [f"point data {array.name}" for array in found.arrays[b"point_data"] if array.name not in point]
+    unread += [f"cell data {array.name}" for array in found.arrays[b"cell_data"] if array.name not in cell]
+    by_run = {name: [values[here] for here in rows] for name, values in cell.items()}
+    return Arrays(point, by_run, unread=tuple(unread))
 
 
 def _readable(arrays: Sequence[Array], tuples: int) -> Iterator[tuple[str, NDArray[Any]]]:

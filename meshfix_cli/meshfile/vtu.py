@@ -189,7 +189,15 @@ def _integers(file: XmlFile, array: Element, size: int) -> NDArray[np.int64]:
 def _arrays(file: XmlFile, pieces: Sequence[_Piece], found: Sequence[Run]) -> Arrays:
     point = _joined(file, [(piece.arrays("PointData"), piece.points) for piece in pieces if piece.points])
     cell = _joined(file, [(piece.arrays("CellData"), piece.cells) for piece in pieces if piece.cells])
-    return Arrays(point=point, cell={name: [values[run.rows] for run in found] for name, values in cell.items()})
+    unread = [
+        f"{kind} data {array.name}"
+        for kind, section, read in (("point", "PointData", point), ("cell", "CellData", cell))
+        for piece in pieces
+        for array in piece.arrays(section)
+        if array.name not in read
+    ]
+    by_run = {name: [values[run.rows] for run in found] for name, values in cell.items()}
+    return Arrays(point, by_run, unread=tuple(dict.fromkeys(unread)))
 
 
 def _joined(file: XmlFile, parts: Iterable[tuple[Sequence[Element], int]]) -> dict[str, NDArray[Any]]:

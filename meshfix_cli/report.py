@@ -147,6 +147,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "fixed": report.fixed,
         "valid": report.valid,
         "misnumbered": report.misnumbered,
+        "mirrored": int(mesh.topology.mirrored.sum()),
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
         "first_inverted": [{"id": i, "centroid": c} for i, c in _listed(report)],

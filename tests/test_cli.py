@@ -308,6 +308,8 @@ def test_a_part_numbered_the_other_way_is_mirrored_not_tangled(tmp_path: Path) -
     meshio.Mesh(points, [("triangle", cells)]).write(tmp_path / "in.vtk")
     text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk").stdout.decode()
     assert f"note: {len(triangles)} triangles in separate parts are numbered the other way round (mirrored)" in text
+    facts = json.loads(run("quality", "--json", tmp_path / "in.vtk").stdout)
+    assert (facts["valid"], facts["mirrored"], facts["misnumbered"]) == (True, len(triangles), 0)
     np.testing.assert_array_equal(meshio.read(tmp_path / "out.vtk").cells[0].data, cells)
     run("untangle", "-q", "--fix-orientation", tmp_path / "in.vtk", tmp_path / "out.vtk")
     assert "mirrored" not in run("quality", tmp_path / "out.vtk").stdout.decode()

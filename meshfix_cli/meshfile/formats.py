@@ -63,7 +63,7 @@ def sniff(data: bytes) -> Format | None:
             return Format(name)
     if re.match(r"\*(\*| *[A-Za-z]{3})", text):
         return Format("abaqus")
-    if re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE) and re.match(r"(#|o |g |v |mtllib )", text):
+    if re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE) and re.match(r"(#|[ogsv] |mtllib |usemtl )", text):
         return Format("obj")
     return None
 

@@ -80,7 +80,10 @@ class Topology:
 
     @cached_property
     def mirrored(self) -> NDArray[np.bool_]:
-        """(m,) bool: simplices of components whose numbering has, for most, the other orientation."""
+        """(m,) bool: simplices of components whose numbering has, for most, the other orientation.
+
+        Components without an inner vertex have that of the whole mesh.
+        """
         votes = np.bincount(self.component, weights=self.flipped * 2.0 - 1.0)
         inner = (self.used & ~self.boundary)[self.simplices].any(axis=1)
         # Without an inner vertex a part is its boundary: that may be tangled as well as mirrored, so all parts vote.

@@ -305,6 +305,54 @@ def test_materials_become_sets_and_sets_materials(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.mesh.movable, document.mesh.movable)
 
 
+def test_a_file_of_sets_holds_its_interface(tmp_path: Path) -> None:
+    document = read(SAMPLES / "two_materials.msh")
+    write(document, document.mesh, tmp_path / "out.inp")
+    np.testing.assert_array_equal(read(tmp_path / "out.inp").mesh.movable, document.mesh.movable)
+
+
+def test_groups_of_different_dimension_are_different_sets(tmp_path: Path, bracket: Mesh) -> None:
+    """Numbers of gmsh's groups are those of a dimension, and its names may differ in what Abaqus cannot see."""
+    tets = bracket.topology.simplices
+    cells = [("triangle", tets[:3, :3]), ("tetra", tets)]
+    physical = [np.array([1, 1, 2]), 1 + np.arange(len(tets)) % 2]
+    groups = {"wall, left": [1, 2], "wall": [2, 2], "steel": [1, 3], "Steel": [2, 3]}
+    data = {"gmsh:physical": physical, "gmsh:geometrical": physical}
+    mesh = meshio.Mesh(bracket.points, cells, cell_data=data, field_data={k: np.array(v) for k, v in groups.items()})
+    mesh.write(tmp_path / "in.msh", file_format="gmsh22", binary=False)
+    document = read(tmp_path / "in.msh")
+    write(document, document.mesh, tmp_path / "out.inp")
+    sets = read(tmp_path / "out.inp").source.arrays.cell_sets
+    sizes = {name: [len(rows) for rows in runs] for name, runs in sets.items()}
+    half = len(tets) // 2
+    assert sizes == {"wall_left": [2, 0], "wall": [1, 0], "steel_1": [0, half], "Steel_2": [0, half]}
+
+
+def test_one_array_tells_materials_apart(tmp_path: Path, plate: Mesh) -> None:
+    m = len(plate.topology.simplices)
+    two = {"gmsh:physical": [1 + np.arange(m) % 2], "RegionId": [np.arange(m)]}
+    document = read(save(tmp_path / "two.vtu", plate, cell_data=two))
+    write(document, document.mesh, tmp_path / "two.msh")
+    after = read(tmp_path / "two.msh").source.arrays.cell
+    np.testing.assert_array_equal(np.concatenate(after["gmsh:physical"]), two["gmsh:physical"][0])
+    np.testing.assert_array_equal(np.concatenate(after["RegionId"]), two["RegionId"][0])
+    plain = read(save(tmp_path / "plain.vtu", plate, cell_data={"number": [np.arange(m)]}))
+    assert "cell data number" in write(plain, plain.mesh, tmp_path / "plain.mesh")[1]
+    assert read(tmp_path / "plain.mesh").mesh.movable.any()
+    chosen = read(tmp_path / "plain.vtu", regions="number")
+    write(chosen, chosen.mesh, tmp_path / "chosen.msh")
+    assert not read(tmp_path / "chosen.msh").mesh.movable.any()
+
+
+def test_labels_of_points_are_no_tags_of_gmsh(tmp_path: Path, plate: Mesh) -> None:
+    document = read(save(tmp_path / "in.mesh", plate, point_data={"medit:ref": np.arange(plate.topology.n)}))
+    write(document, document.mesh, tmp_path / "out.msh")
+    np.testing.assert_array_equal(read(tmp_path / "out.msh").source.arrays.point["medit:ref"], range(plate.topology.n))
+    with gmsh_session() as gmsh:
+        gmsh.open(str(tmp_path / "out.msh"))
+        assert len(gmsh.view.getTags()) == 1
+
+
 def test_a_converted_file_has_one_run_for_each_type(tmp_path: Path, bracket: Mesh) -> None:
     """Programs that read MEDIT files take the last of several lists of one kind."""
     tets, label = bracket.topology.simplices, np.arange(len(bracket.topology.simplices)) % 3

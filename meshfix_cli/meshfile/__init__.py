@@ -279,6 +279,8 @@ def _write_anew(
         corners = _spatial(back.points)[back.vertices_of(*kind)]
         difference = np.abs(corners - _spatial(held)[expected]).max()
         dropped = source.lost_in(back)
+        if back.arrays.unread:
+            raise WriteError(f"cannot be written as {form.name}: it would hold {back.arrays.unread[0]}")
     except WriteError:
         raise
     except (MeshfixError, IndexError, ValueError) as error:

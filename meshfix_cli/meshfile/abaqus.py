@@ -21,7 +21,10 @@ from meshfix_cli.meshfile.text import Spans, integers_at, line_words
 
 _LONGEST = 20  # characters of a number
 _EMPTY_FIELD = re.compile(rb",[ \t]*,")
-_FACE = re.compile(rb",[ \t]*(?:[SPFR][1-6]|SPOS|SNEG)\b", re.IGNORECASE)
+_FACE = re.compile(
+    rb",[ \t]*(?:(?:HP|TRVEC|TRSHR|ED(?:LD|NOR|SHR|TRA|MOM)|[SPFRE])[1-6]|[SPFR](?:POS|NEG))(?:NU|FC|TU)?\b",
+    re.IGNORECASE,
+)
 
 # Families of elements, behind which the number of nodes tells the shape; all others only hold their nodes.
 _SOLID = re.compile(r"(?:[A-Z]{0,3}C3D|Q3D)(4|5|6|8|10|15|20)(?![\dV])")
@@ -40,7 +43,9 @@ def parse(data: bytes) -> Source | None:
     counts = [len(run.vertices) for run in cells]
     elements = Labels({block: run.ids for block, run in zip(blocks, cells, strict=True) if run.ids is not None})
     sections = [block for block in deck.blocks if block.keyword.endswith("SECTION") and "ELSET" in block.parameters]
-    sections = sections or [block for block in blocks if "ELSET" in block.parameters]  # the mesh of another file
+    if not sections:  # the mesh of another file: its sets are all that tells materials apart
+        sections = [block for block in blocks if "ELSET" in block.parameters]
+        sections = sections or [block for block in reversed([*deck.of("ELSET")]) if "ELSET" in block.parameters]
     load = partial(arrays, deck, nodes, elements, counts, sections)
     points = coordinates.read(deck.text)
     notes = (

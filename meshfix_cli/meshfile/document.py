@@ -113,6 +113,8 @@ class Document:
 def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
     dimension = _dimension(source)
+    if regions is not None and regions in source.arrays.cell:
+        source = replace(source, regions=(regions,))
     starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
     chosen = _runs_of_simplices(source, dimension)
     simplices = _all_simplices(source, dimension)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -21,6 +22,7 @@ from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset({"line", "triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"})
+_TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _WITH_SETS = ("abaqus", "exodus")
 _SPATIAL = ("obj", "off", "ply", "stl")  # these have no plane meshes
@@ -69,41 +71,50 @@ def _refuse(missing: str | None) -> None:
 
 def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kept: list[int], form: Format) -> Any:
     """The kept runs of cells; what tells materials apart goes where the format has it."""
+    region = next((name for name in source.regions if name in arrays.cell), None)
+    material = _MATERIALS.get(form.reader)
 
-    def name(text: str) -> str:
-        if text in source.regions:
-            text = _MATERIALS.get(form.reader, text)
+    def name(text: str, of_cells: bool = False) -> str:
+        if of_cells and material and text in (region, material):  # one array takes the place
+            text = material if text == region or region is None else f"{text} of the input"
         return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
 
     def values(key: str, array: Any) -> Any:
-        if form.reader == "gmsh" and not form.binary and not key.startswith("gmsh:"):
+        if form.reader == "gmsh" and not form.binary and key not in _TAGS:
             return np.asarray(array, dtype=np.float64).astype(object)  # meshio writes the repr, "np.float64(1.0)"
         return array
 
-    names = {key: name(key) for key in (*arrays.cell, *arrays.point)}
-    cell = {names[key]: [values(names[key], runs[i]) for i in kept] for key, runs in arrays.cell.items()}
-    holds_sets = form.name in _WITH_SETS
-    cell_sets = {**arrays.cell_sets, **_materials(source, arrays)} if holds_sets else {}
+    cell = {name(key, True): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
+    if form.reader == "medit":  # any integers would be taken for references
+        cell = {key: runs for key, runs in cell.items() if key == material}
+    sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(
         points,
         [(source.cells[i].type, source.cells[i].vertices) for i in kept],
-        point_data={names[key]: values(names[key], array) for key, array in arrays.point.items()},
-        # MEDIT files take the first array of integers.
-        cell_data=dict(sorted(cell.items(), key=lambda item: item[0] != "medit:ref")),
-        field_data=dict(arrays.groups),
-        point_sets=dict(arrays.point_sets) if holds_sets else {},
-        cell_sets={key: [runs[i] for i in kept] for key, runs in cell_sets.items()},
+        point_data={name(key): values("", array) for key, array in arrays.point.items()},
+        cell_data={key: [values(key, array) for array in runs] for key, runs in cell.items()},
+        # The numbers of sets of groups are not those of the groups.
+        field_data={} if region == "gmsh:physical_set" else dict(arrays.groups),
+        point_sets=dict(arrays.point_sets) if form.name in _WITH_SETS else {},
+        cell_sets={key: [runs[i] for i in kept] for key, runs in sets.items()},
     )
 
 
-def _materials(source: Source, arrays: Arrays) -> dict[str, list[NDArray[np.int64]]]:
+def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, list[NDArray[np.int64]]]:
     """For each material, by the name of its group, the rows of the cells in each run."""
-    titles = {int(number): title for title, (number, _) in arrays.groups.items()}
+    titles = {
+        (int(number), int(dimension)): re.sub(r"[^\w.-]+", "_", title)  # what Abaqus takes for one name
+        for title, (number, dimension) in arrays.groups.items()
+    }
+    used = [title.upper() for title in titles.values()]  # it does not tell small letters from capitals
     sets: dict[str, list[NDArray[np.int64]]] = {}
-    for region in (name for name in source.regions if name in arrays.cell):
-        for label in np.unique(np.concatenate(arrays.cell[region])).tolist():
-            rows = [np.flatnonzero(values == label) for values in arrays.cell[region]]
-            sets.setdefault(titles.get(label, f"REGION_{label}"), rows)
+    for i, labels in enumerate(arrays.cell[region] if region else ()):
+        dimension = meshio._mesh.topological_dimension.get(source.cells[i].type, -1)
+        for label in np.unique(labels).tolist():
+            title = titles.get((label, dimension), "REGION") if region == "gmsh:physical" else "REGION"
+            title = title if used.count(title.upper()) == 1 else f"{title}_{label}"
+            rows = sets.setdefault(title, [np.empty(0, dtype=np.int64)] * len(source.cells))
+            rows[i] = np.flatnonzero(labels == label)
     return sets
 
 

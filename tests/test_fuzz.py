@@ -12,12 +12,13 @@ import tracemalloc
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from test_splice import FORMATS, MODULES
 
-from meshfix_cli import read, untangle, write
+from meshfix_cli import _kernels, read, untangle, write
 from meshfix_cli.errors import MeshfixError
 
 EXAMPLES = int(os.environ.get("MESHFIX_FUZZ", "0"))  # of each format; 0: the same hundred in every run
@@ -102,6 +103,10 @@ def check(path: Path, data: bytes) -> None:
         tracemalloc.stop()
         assert time.monotonic() - start < SECONDS
     again = read(target)
+    for mesh in (document.mesh, again.mesh):
+        sizes = _kernels.measure(mesh.points, mesh.topology.simplices, 1)[0]
+        if abs(sizes.sum()) < 1e-9 * np.abs(sizes).sum():
+            return  # a vertex so far away that rounding tells which orientation is the positive one
     inverted, smallest = again.mesh.check()
     assert inverted == result.check()[0]
     if document.basis is None:  # else the plane of a flat mesh is found anew

@@ -242,6 +242,15 @@ def test_sets_of_elements_are_materials_where_no_section_says_so() -> None:
     assert np.concatenate(parsed(half).arrays.cell["abaqus:section"]).tolist() == [1, 1, 2, 2]
 
 
+def test_other_sets_are_materials_where_each_element_is_in_one() -> None:
+    for sets, labels in (
+        (b"*ELSET, ELSET=L\n1, 2\n*ELSET, ELSET=R\n3, 4\n", [1, 1, 2, 2]),
+        (b"*ELSET, ELSET=L\n1, 2\n", [0, 0, 0, 0]),
+        (b"*ELSET, ELSET=L\n1, 2\n*ELSET, ELSET=R\n2, 3, 4\n", [0, 0, 0, 0]),
+    ):
+        assert np.concatenate(parsed(SMALL + sets).arrays.cell["abaqus:section"]).tolist() == labels
+
+
 def test_elements_whose_faces_are_named_are_not_renumbered() -> None:
     source = parsed(SMALL + b"*SURFACE, TYPE=ELEMENT, NAME=Load\n1, S2\n")
     assert source.layout is not None

@@ -45,7 +45,8 @@ def parse(data: bytes) -> Source | None:
     sections = [block for block in deck.blocks if block.keyword.endswith("SECTION") and "ELSET" in block.parameters]
     if not sections:  # the mesh of another file: its sets are all that tells materials apart
         sections = [block for block in blocks if "ELSET" in block.parameters]
-        sections = sections or [block for block in reversed([*deck.of("ELSET")]) if "ELSET" in block.parameters]
+        if len({block.parameters["ELSET"].upper() for block in sections}) < 2:  # one set of all tells nothing
+            sections = [block for block in deck.of("ELSET") if "ELSET" in block.parameters]
     load = partial(arrays, deck, nodes, elements, counts, sections)
     points = coordinates.read(deck.text)
     notes = (

@@ -84,6 +84,10 @@ def arrays(deck: Deck, nodes: Labels, elements: Labels, counts: Sequence[int], s
         if (block.scope, name.upper()) not in cell_sets:
             raise ReadError(f"*{block.keyword} names the element set {name}, and there is none")
         numbers[cell_sets[block.scope, name.upper()]] = number
+    if sections and sections[0].keyword == "ELSET":  # any sets may be materials, if each element is in one of them
+        keys = {(block.scope, block.parameters["ELSET"].upper()) for block in sections}
+        if sum(len(cell_sets[key]) for key in keys) != len(numbers) or not numbers.all():
+            numbers[:] = 0
     return Arrays(
         cell={SECTION: np.split(numbers, starts[1:])[:-1]} if sections else {},
         point_sets={point_names[key]: rows for key, rows in point_sets.items()},

@@ -33,7 +33,7 @@ _SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10",
 _PLANES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 
 
-def parse(data: bytes) -> Source | None:
+def parse(data: bytes) -> Source:
     """Read nodes and elements; nodes of different parts are different points."""
     deck = read_deck(data)
     coordinates, nodes = _nodes(deck)

@@ -113,8 +113,8 @@ class Document:
 def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
     dimension = _dimension(source)
-    if regions is not None and regions in source.arrays.cell:
-        source = replace(source, regions=(regions,))
+    if regions is not None:
+        source = _with_regions(source, regions)
     starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
     chosen = _runs_of_simplices(source, dimension)
     simplices = _all_simplices(source, dimension)
@@ -129,7 +129,7 @@ def build(name: str, source: Source, form: Format, fix: str | None, regions: str
     mesh = Mesh.build(points, simplices)
     topology = mesh.topology
     reasons = {"on the boundary": topology.boundary}
-    for key in _region_arrays(source, regions):
+    for key in source.regions:
         labels = np.concatenate([source.arrays.cell[key][i] for i in chosen])
         if labels.ndim != 1:
             raise ReadError(f"the cell data {key!r} are not labels of regions: they have {labels.shape[1]} components")
@@ -253,13 +253,12 @@ def _region_codes(labels: NDArray[Any], simplices: NDArray[np.int64], topology: 
     return np.array([known.setdefault(frozenset(members[g]), len(known)) for g in group[topology.source].tolist()])
 
 
-def _region_arrays(source: Source, name: str | None) -> tuple[str, ...]:
-    if name is None:
-        return source.regions
+def _with_regions(source: Source, name: str) -> Source:
+    """Let another array tell the regions apart; what has been read is not read again."""
     if name not in source.arrays.cell:
         known = ", ".join(sorted(source.arrays.cell)) or "none"
         raise ReadError(f"there is no cell data named {name!r} (found: {known})")
-    return (name,)
+    return replace(source, regions=(name,), load=lambda: source.arrays)
 
 
 def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:

@@ -55,7 +55,7 @@ class _Section:
         return self.name.removeprefix("Required") if self.name.startswith("Required") else None
 
 
-def parse(data: bytes) -> Source | None:
+def parse(data: bytes) -> Source:
     """Read vertices and cells; vertices that are required or corners, alone or with their cell, are held."""
     if data[:4] in _BINARY:
         raise ReadError("is a binary file of medit (.meshb), which meshfix does not read")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from meshfix_cli import _kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
-from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply
+from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply, pairs
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 
 _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r|\Z)")
@@ -287,13 +287,12 @@ def promoted(data: bytes) -> bytes:
     vertex = _tables(data, header)["vertex"]
     words = [b"float64" if data[slice(*one.declared)] == b"float32" else b"double" for one in axes]
     ends = np.cumsum([0, *map(len, words)])
-    edits = [Edits(np.array([one.declared for one in axes]), b"".join(words), np.stack([ends[:-1], ends[1:]], axis=1))]
+    edits = [Edits(np.array([one.declared for one in axes]), b"".join(words), pairs(ends))]
     if header.order:
         numbers = _coordinates(vertex, axes)
         with np.errstate(invalid="ignore"):  # signalling NaN
             wide = numbers.read(data).astype(f"{header.order}f8").tobytes()
-        begin = np.arange(0, len(wide), 8)
-        edits.append(Edits(numbers.spans.reshape(-1, 2), wide, np.stack([begin, begin + 8], axis=1)))
+        edits.append(Edits(numbers.spans.reshape(-1, 2), wide, pairs(np.arange(0, len(wide) + 1, 8))))
     return apply(data, edits)
 
 

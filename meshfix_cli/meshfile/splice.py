@@ -105,11 +105,11 @@ class Places:
         spans = self.spans[rows, :2]
         words = [data[first:last] for first, last in spans[:, ::-1].reshape(-1, 2).tolist()]
         ends = np.cumsum([0, *map(len, words)])
-        return Edits(np.ascontiguousarray(spans.reshape(-1, 2)), b"".join(words), _pairs(ends))
+        return Edits(np.ascontiguousarray(spans.reshape(-1, 2)), b"".join(words), pairs(ends))
 
     def _encode(self, values: Points) -> tuple[bytes, Spans]:
         if self.end is None:
-            return values.astype(self.dtype).tobytes(), _pairs(np.arange(len(values) + 1) * self.dtype.itemsize)
+            return values.astype(self.dtype).tobytes(), pairs(np.arange(len(values) + 1) * self.dtype.itemsize)
         return _kernels.shortest(values.astype(np.float64), self.dtype.itemsize == 4, self.longest)
 
 
@@ -163,6 +163,6 @@ def apply(data: bytes, edits: Sequence[Edits]) -> bytes:
     return _kernels.replace(data, spans[order], b"".join(edit.words for edit in edits), word_spans[order])
 
 
-def _pairs(offsets: NDArray[np.int64]) -> Spans:
+def pairs(offsets: NDArray[np.int64]) -> Spans:
     """Spans (k, 2) between consecutive offsets (k+1,)."""
     return np.stack([offsets[:-1], offsets[1:]], axis=1).astype(np.int64)

@@ -79,7 +79,7 @@ class _Facets:
         return places.replace(wrong, values)
 
 
-def parse(data: bytes) -> Source | None:
+def parse(data: bytes) -> Source:
     """Read facets; corners with the same coordinates are one point."""
     facets = int.from_bytes(data[80:_HEAD], "little")
     missing = _HEAD + facets * _BINARY.itemsize - len(data)

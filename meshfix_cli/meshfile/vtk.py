@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
+from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.vtk_cells import GHOSTS, TYPES, Run, ghosts, runs
+from meshfix_cli.meshfile.vtk_cells import TYPES, Run, markings, runs
 from meshfix_cli.meshfile.vtk_sections import Array, Sections, find_sections
 
 # The types of cells that polydata do not tell: that of any number of vertices, and those of some numbers.
@@ -42,11 +42,8 @@ def parse(data: bytes) -> Source | None:
     layout = InPlace(data, coordinates, [partial(table.places, run) for table, run in pairs])
     load = cache(partial(_arrays, found, points.tuples, [table.first + run.rows for table, run in pairs]))
     named = {array.name for array in found.arrays[b"cell_data"]}
-    regions = tuple(name for name in REGIONS if name in named)
-    for name in (*regions, *GHOSTS & named):
-        if name not in load().cell:
-            raise ReadError(f"is not a readable vtk file: its cell data {name!r} cannot be read")
-    held = ghosts(load().cell, [run for _, run in pairs], points.tuples) if GHOSTS & named else None
+    damaged = "is not a readable vtk file: its cell data {} cannot be read"
+    regions, held = markings(named, lambda: load().cell, [run for _, run in pairs], points.tuples, damaged)
     untold = dict.fromkeys(["field data"] * bool(found.arrays[b"dataset"]) + found.untold)
     return Source(points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold))
 

@@ -5,14 +5,14 @@ Source: VTK, "vtkCellType.h".
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import Cells
+from meshfix_cli.meshfile.source import REGIONS, Cells
 
 # meshio's name (ours where it has none) and the number of vertices; 0: any.
 TYPES = {
@@ -89,7 +89,30 @@ def runs(types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivi
     return found
 
 
-def ghosts(cell: Mapping[str, Sequence[NDArray[Any]]], found: Sequence[Run], n: int) -> NDArray[np.bool_]:
+def markings(
+    names: Set[str],
+    cell: Callable[[], Mapping[str, Sequence[NDArray[Any]]]],
+    found: Sequence[Run],
+    n: int,
+    damaged: str,
+) -> tuple[tuple[str, ...], NDArray[np.bool_] | None]:
+    """Return which cell arrays tell materials apart, and the vertices (n,) of ghost cells, if cells are marked so.
+
+    Parameters
+    ----------
+    names : set of str
+        All cell arrays; `cell` reads them, if one of them matters.
+    damaged : str
+        What is said of one that matters and cannot be read: else an interface would be free to move.
+    """
+    regions, marks = tuple(name for name in REGIONS if name in names), GHOSTS & names
+    for name in (*regions, *marks):
+        if name not in cell():
+            raise ReadError(damaged.format(repr(name)))
+    return regions, _ghosts(cell(), found, n) if marks else None
+
+
+def _ghosts(cell: Mapping[str, Sequence[NDArray[Any]]], found: Sequence[Run], n: int) -> NDArray[np.bool_]:
     """Mark the vertices of cells that another piece, or another file, has as well."""
     held = np.zeros(n, dtype=bool)
     for name in GHOSTS & cell.keys():

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import REGIONS, Arrays, Source
+from meshfix_cli.meshfile.source import Arrays, Source
 from meshfix_cli.meshfile.splice import Points, differing
 from meshfix_cli.meshfile.vtk_arrays import Payload
-from meshfix_cli.meshfile.vtk_cells import GHOSTS, Run, ghosts, runs
+from meshfix_cli.meshfile.vtk_cells import Run, markings, runs
 from meshfix_cli.meshfile.vtk_xml import Element, XmlFile
 
 
@@ -42,10 +42,8 @@ def parse(data: bytes) -> Source:
     layout = _Layout(file, points.dtype, shares, cells.shares, [cells.offsets[run.rows] for run in found])
     load = cache(lambda: _arrays(file, pieces, found))
     labels = {array.name for piece in pieces for array in piece.arrays("CellData")}
-    regions = tuple(name for name in REGIONS if name in labels)
-    for name in labels & {*REGIONS, *GHOSTS} - load().cell.keys() if labels & {*REGIONS, *GHOSTS} else ():
-        raise ReadError(f"is not a readable vtu file: its cell data {name!r} are damaged, or not those of all pieces")
-    held = ghosts(load().cell, found, len(points)) if labels & GHOSTS else None
+    damaged = "is not a readable vtu file: its cell data {} are damaged, or not those of all pieces"
+    regions, held = markings(labels, lambda: load().cell, found, len(points), damaged)
     return Source(points, [run.cells for run in found], layout, load, regions, held, _untold(file, pieces))
 
 

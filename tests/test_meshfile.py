@@ -260,6 +260,14 @@ def test_gmsh_4_is_not_made_of_other_files(tmp_path: Path) -> None:
         output_format(read(SAMPLES / "two_materials.msh"), str(tmp_path / "o.msh"), "gmsh")
 
 
+def test_isolated_points_may_be_anything(tmp_path: Path) -> None:
+    text = (SAMPLES / "plate_tangled.obj").read_text()
+    (tmp_path / "in.obj").write_text(f"{text}v nan inf -inf\nv 1e308 1e308 1e308\n")
+    document, after = roundtrip(tmp_path / "in.obj", tmp_path / "out.obj")
+    assert after.source.points[-2:].tobytes() == document.source.points[-2:].tobytes()
+    assert "2 points belong to no triangle" in document.notes[0]
+
+
 @pytest.mark.parametrize("noise", [b"", b"\x00\x01\x02\xff" * 99, b"hello", b"<?xml?><svg/>"])
 def test_noise_has_no_format(noise: bytes) -> None:
     assert sniff(noise) is None

@@ -79,7 +79,7 @@ class Document:
         used = points[mesh.topology.used]
         if not (np.abs(used) <= LARGEST_COORDINATE).all():
             raise InvalidMeshError("the coordinates are too large for the numbers of the file")
-        return mesh.with_points(np.ascontiguousarray(points if self.basis is None else points @ self.basis.T))
+        return mesh.with_points(np.ascontiguousarray(points if self.basis is None else _flat(points, self.basis)))
 
     def first_valid_as_stored(self, *meshes: Mesh) -> Mesh:
         """Return the first of some moved meshes that is valid as the file stores it, else the best."""
@@ -216,8 +216,13 @@ def _solved_points(
     if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
         return flat, None
     basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))
-    with np.errstate(invalid="ignore"):  # isolated points may be anything
-        return points @ basis.T, basis
+    return _flat(points, basis), basis
+
+
+def _flat(points: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return points (n, 3) in the coordinates of a plane."""
+    with np.errstate(invalid="ignore", over="ignore"):  # isolated points may be anything
+        return points @ basis.T
 
 
 def _on_other_cells(source: Source, chosen: list[int], n: int) -> NDArray[np.bool_]:

@@ -52,13 +52,35 @@ def relocate(
     stars: Stars,
     blocks: Int32,
     threshold_sine2: float,
-    only_invalid: bool,
+    min_measure: float,
+    start: Float64,
+    max_move: float,
     threads: int,
 ) -> tuple[int, int]:
-    """Relocate, in place, the movable vertices of some blocks of one colour; the numbers visited and moved."""
+    """Relocate, in place, the movable vertices of some blocks of one colour; the numbers visited and moved.
 
-def linear_program(neighbours: Float64, faces: NDArray[np.uint16]) -> tuple[int, Float64, Float64, int]:
-    """Status (0 optimal, 1 degenerate, 2 failed), (x, t), dual weights of faces and box sides, pivots."""
+    Smoothing makes no measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
+    """
+
+def linear_program(
+    neighbours: Float64, faces: NDArray[np.uint16], heights: bool
+) -> tuple[int, Float64, Float64, Float64, int]:
+    """Status (0 optimal, 1 degenerate, 2 failed), (x, t), dual weights of faces and box sides, axes of the box, pivots.
+
+    heights: t is the smallest height over a face instead of the smallest determinant.
+    """
+
+def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
+    """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
+
+class Foldover:
+    """The foldover-free energy of simplices and its gradient; see kernels/foldover.hpp."""
+
+    def __init__(self, simplices: Int32, n: int) -> None: ...
+    def evaluate(
+        self, points: Float64, sizes: Float64, eps: float, weight: float, free: int, threads: int
+    ) -> tuple[float, Float64, float]:
+        """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
 
 def min_norm_point(vectors: Float64) -> Float64:
     """Return the point of smallest norm in the convex hull of the rows."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import sys
@@ -16,7 +17,7 @@ import click
 from meshfix_cli import __version__
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.perturb import Distance
-from meshfix_cli.untangle import SMOOTH, STRATEGIES, SWEEPS, THRESHOLD
+from meshfix_cli.untangle import SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh import Mesh
@@ -214,6 +215,7 @@ class _Show:
         requirements: tuple[Requirement, ...] = (),
         **more: Any,
     ) -> Report:
+        from meshfix_cli.obstacles import find_obstacles
         from meshfix_cli.quality import ceiling, summarise
         from meshfix_cli.report import Report
 
@@ -227,6 +229,7 @@ class _Show:
             ids=document.ids,
             stages={stage: summarise(mesh, metrics, self.threads) for stage, mesh in stages.items()},
             ceiling=ceiling(result, self.threads),
+            obstacles=find_obstacles(result, self.threads),
             fixed=document.fixed,
             notes=(*document.notes, *notes),
             requirements=requirements,
@@ -308,7 +311,11 @@ def main() -> None:
 @main.command()
 @_writing
 @click.option("--strategy", type=click.Choice(tuple(STRATEGIES)), default="auto", show_default=True)
-@click.option("--sweeps", type=click.IntRange(0), default=SWEEPS, show_default=True, help="Untangling sweeps at most.")
+@click.option(
+    "--sweeps",
+    type=click.IntRange(0),
+    help="Untangling sweeps at most. [default: 40; auto and FF stop when they stall]",
+)
 @click.option("--smooth", type=click.IntRange(0), default=SMOOTH, show_default=True, help="Smoothing passes.")
 @click.option(
     "--threshold",
@@ -316,6 +323,8 @@ def main() -> None:
     metavar="DEGREES",
     help=f"Optimise stars with smaller angles. [default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
 )
+@click.option("--max-move", type=_Distance(), help="Move no vertex farther: 0.5h is half a mean edge length.")
+@click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them.")
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
 @click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
@@ -327,9 +336,11 @@ def untangle(
     held: _Held,
     show: _Show,
     strategy: str,
-    sweeps: int,
+    sweeps: int | None,
     smooth: int,
     threshold: float | None,
+    max_move: Distance | None,
+    only_invalid: bool,
     history: str | None,
     cells: str | None,
     allow_inverted: bool,
@@ -337,19 +348,25 @@ def untangle(
 ) -> None:
     """Move interior vertices until no element is inverted, then improve the worst angles.
 
-    Strategies: auto (Laplacian sweeps, then the linear programme on stars that are still invalid), and the paper's
-    LS (Laplacian), US (linear programme), CS (both for each vertex), LUS (3 Laplacian sweeps, then the programme).
+    Strategies: auto (Laplacian sweeps, the linear programme on stars that are still invalid, then FF where that is not
+    enough), FF (the foldover-free energy, minimised over all vertices at once), and the paper's LS (Laplacian), US
+    (linear programme), CS (both for each vertex), LUS (3 Laplacian sweeps, then the programme).
     For CONDITION see `meshfix quality --help`.
     """
     from meshfix_cli.meshfile import check_cells, write_text
+    from meshfix_cli.quality import displacement
     from meshfix_cli.report import console, history_csv, with_progress
     from meshfix_cli.untangle import collect, plan, steps
 
     document, output = files.open(held, history, cells)
     if cells is not None:
         check_cells(document, cells)
-    run = steps(document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, threads=show.threads)
-    outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)))
+    reach = math.inf if max_move is None else max_move.length(document.mesh)
+    run = steps(
+        document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, max_move=reach,
+        only_invalid=only_invalid, threads=show.threads,
+    )  # fmt: skip
+    outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)), show.threads)
     after = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
     result, notes = files.write(document, after, output)
     notes = (*_what_happened(document, outcome, after, result), *notes)
@@ -358,7 +375,7 @@ def untangle(
     if cells is not None:
         _write_cells(document, result, cells, show.threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
-    facts = {"strategy": strategy}
+    facts = {"strategy": strategy, "displacement": displacement(outcome.before, result)}
     report = show.report("untangle", document, stages, notes, requirements, records=outcome.records, facts=facts)
     show.print(report, files.report_stream)
     sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)

@@ -71,7 +71,7 @@ class Topology:
     @cached_property
     def used(self) -> NDArray[np.bool_]:
         """(n,) bool: the vertices of simplices; other points are isolated."""
-        return self._mark(self.simplices)
+        return self.mark(self.simplices)
 
     @cached_property
     def boundary(self) -> NDArray[np.bool_]:
@@ -101,13 +101,21 @@ class Topology:
         across = labels[self.mates // (self.dimension + 1)]
         return self._mark_facets((self.mates >= 0) & (across != labels[:, None]))
 
+    def grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
+        """(n,) bool: these vertices and `rings` rings of neighbours around them."""
+        grown = vertices.copy()
+        for _ in range(rings):
+            grown[self.simplices[grown[self.simplices].any(axis=1)]] = True
+        return grown
+
     def facet_pairs(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the two simplices at each interior facet."""
         corner = np.flatnonzero(self.mates.ravel() > np.arange(self.mates.size))
         mate = self.mates.ravel()[corner]
         return (corner // (self.dimension + 1)).astype(np.int32), mate // np.int32(self.dimension + 1)
 
-    def _mark(self, vertices: NDArray[np.int32]) -> NDArray[np.bool_]:
+    def mark(self, vertices: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """(n,) bool: these vertices."""
         mask = np.zeros(self.n, dtype=bool)
         mask[vertices] = True
         return mask

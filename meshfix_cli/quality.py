@@ -172,6 +172,13 @@ def distances(before: Mesh, after: Mesh) -> Array:
     return moved
 
 
+def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
+    """Return the mean over the vertices that moved and the largest distance, in model units, and their number."""
+    far = distances(before, after)
+    moved = far[far > 0]
+    return {"mean": float(moved.mean()) if len(moved) else 0.0, "largest": float(far.max()), "vertices": len(moved)}
+
+
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     """Return the smallest angle among simplices with no free vertex: no method can raise it. None: there are none."""
     stuck = mesh.topology.simplices[~mesh.movable[mesh.topology.simplices].any(axis=1)]

@@ -17,6 +17,7 @@ from meshfix_cli.mesh import CELL_NAMES, Mesh
 from meshfix_cli.quality import BIN_WIDTH, Requirement, Summary
 
 if TYPE_CHECKING:
+    from meshfix_cli.obstacles import Obstacles
     from meshfix_cli.untangle import SweepRecord
 
 SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
@@ -42,6 +43,8 @@ class Report:
         Summaries by name in the order of the table's columns; the last is that of the result.
     ceiling : float or None
         Degrees; the smallest angle that fixed vertices set.
+    obstacles : Obstacles
+        What makes a valid mesh impossible.
     fixed : dict
         Number of fixed vertices by reason.
     records : sequence of SweepRecord
@@ -61,6 +64,7 @@ class Report:
     ids: NDArray[np.int64]
     stages: dict[str, Summary]
     ceiling: float | None
+    obstacles: Obstacles
     fixed: dict[str, int]
     records: Sequence[SweepRecord] = ()
     notes: Sequence[str] = ()
@@ -79,15 +83,9 @@ class Report:
         return int(self.mesh.topology.misnumbered.sum())
 
     @property
-    def stuck(self) -> int:
-        """Inverted elements without a free vertex: nothing that may move can mend them."""
-        simplices = self.mesh.topology.simplices[self.result.inverted_elements]
-        return int((~self.mesh.movable[simplices].any(axis=1)).sum())
-
-    @property
     def valid(self) -> bool:
-        """No element is inverted, by shape or by numbering."""
-        return self.result.inverted == 0 and self.misnumbered == 0
+        """No element is inverted, by shape or by numbering, and no fixed boundary crosses itself."""
+        return self.result.inverted == 0 and self.misnumbered == 0 and not self.obstacles
 
     @property
     def met(self) -> bool:
@@ -151,7 +149,11 @@ def to_json(report: Report) -> dict[str, Any]:
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
         "first_inverted": [{"id": i, "centroid": c} for i, c in _listed(report)],
-        "inverted_without_free_vertex": report.stuck,
+        "inverted_without_free_vertex": len(report.obstacles.inverted),
+        "obstacles": {
+            "inverted": report.ids[report.obstacles.inverted].tolist(),
+            "crossing": report.ids[report.obstacles.crossing].tolist(),
+        },
         "sweeps": [asdict(record) for record in report.records],
         "notes": list(report.notes),
         "requirements": [
@@ -254,7 +256,8 @@ def _phases(records: Sequence[SweepRecord]) -> str:
 
 
 def _verdict(report: Report) -> list[str]:
-    lines = [_perturbed(report.facts)] if report.facts and "moved" in report.facts else []
+    facts = report.facts or {}
+    lines = [_perturbed(facts)] if "moved" in facts else [_displaced(facts)] if "displacement" in facts else []
     count = report.result.inverted
     if report.valid:
         return [*lines, "valid: no element is inverted"]
@@ -263,8 +266,7 @@ def _verdict(report: Report) -> list[str]:
         text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
         lines.append(text + (f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"))
         lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
-        if report.stuck:
-            lines.append(f"{report.stuck:,} of them without a free vertex: the fixed ones are wrong")
+    lines += _impossible(report)
     if report.misnumbered:
         first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[: report.listed]].tolist()
         some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > len(first) else "")
@@ -272,6 +274,26 @@ def _verdict(report: Report) -> list[str]:
         text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (element {some})"
         lines.append(f"{text}; untangle --fix-orientation renumbers them")
     return lines
+
+
+def _impossible(report: Report) -> Iterator[str]:
+    """Name what no motion of the free vertices can mend."""
+    stuck, crossing = report.ids[report.obstacles.inverted], report.ids[report.obstacles.crossing]
+    some = slice(report.listed)
+    if len(stuck):
+        more = ", ..." if len(stuck[some]) < len(stuck) else ""
+        which = f"element{'s' * (len(stuck) > 1)} {', '.join(map(str, stuck[some].tolist()))}{more}"
+        yield f"IMPOSSIBLE: {len(stuck):,} of them without a free vertex: the fixed ones are wrong ({which})"
+    if len(crossing):
+        more = ", ..." if len(crossing[some]) < len(crossing) else ""
+        which = ", ".join(f"{a} and {b}" for a, b in crossing[some].tolist())
+        what = "place" if len(crossing) == 1 else "places"
+        yield f"IMPOSSIBLE: the fixed boundary crosses itself in {len(crossing):,} {what} (elements {which}{more})"
+
+
+def _displaced(facts: Mapping[str, Any]) -> str:
+    far = facts["displacement"]
+    return f"moved {far['vertices']:,} vertices by {far['mean']:.3g} in the mean and {far['largest']:.3g} at most"
 
 
 def _perturbed(facts: Mapping[str, Any]) -> str:

@@ -10,19 +10,25 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from itertools import count
+from itertools import cycle, islice
 from typing import TYPE_CHECKING, Literal
 
 from meshfix_cli import _kernels
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from meshfix_cli.mesh import Mesh
+    from meshfix_cli.obstacles import Obstacles
 
 SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
 SMOOTH = 3  # section 4: three passes of smoothing
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
-PATIENCE = 3  # sweeps without fewer inverted elements after which a phase has stalled
+PATIENCE = 3  # turns through the moves of a phase without progress after which it has stalled
+PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
+NEAR = 2  # rings around invalid simplices that `only_invalid` lets move, and one around what moved
 
 
 class Move(IntEnum):
@@ -33,49 +39,60 @@ class Move(IntEnum):
     COMBINED_UNTANGLE = 2
     SMART_LAPLACIAN = 3
     COMBINED_SMOOTH = 4
+    UNTANGLE_HEIGHTS = 5
 
 
 @dataclass(frozen=True)
 class Phase:
-    """Sweeps of one move.
+    """Sweeps of vertex moves, or minimisations of the foldover-free energy.
 
     Attributes
     ----------
     name : str
         As shown in the report.
-    move : Move
+    moves : tuple of Move
+        Those of the sweeps, in turn. None: the phase minimises the energy of `foldover.py`.
     max_sweeps : int or None
-        None: as many as the limit of all untangling sweeps leaves.
+        None: the limit of all untangling sweeps, `SWEEPS` where there is none.
     until : {"valid", "stalled", "settled"}
-        When to stop early. "valid": no element is inverted; "stalled": as well, or their number has not fallen
-        below the best for `PATIENCE` sweeps;
+        When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for `PATIENCE`
+        turns through the moves neither were there fewer inverted elements nor was the smallest measure larger;
         "settled": no vertex moved, which stops every phase.
     only_invalid : bool
-        Visit only stars with an inverted element.
+        LP moves visit only stars with an inverted element and those whose neighbours moved in the sweep before.
     from_best : bool
         Start from the best mesh met so far, that of the input included, not from the last.
+    rings : tuple of (int or None)
+        The energy's regions, to be tried one after the other: so many rings around the inverted elements; None: the
+        whole mesh.
     """
 
     name: str
-    move: Move
+    moves: tuple[Move, ...] = ()
     max_sweeps: int | None = None
     until: Literal["valid", "stalled", "settled"] = "valid"
     only_invalid: bool = False
     from_best: bool = False
+    rings: tuple[int | None, ...] = ()
 
 
-_LAPLACIAN = Phase("Laplacian", Move.LAPLACIAN)
-_LP = Phase("LP", Move.UNTANGLE)
+_LAPLACIAN = Phase("Laplacian", (Move.LAPLACIAN,))
+_LP = Phase("LP", (Move.UNTANGLE,))
+_LP_CYCLES = (*(Move.UNTANGLE_HEIGHTS,) * 3, Move.SMART_LAPLACIAN)
+_FOLDOVER = Phase("FF", max_sweeps=120, from_best=True, rings=(None,))
 
 STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "auto": (
-        replace(_LAPLACIAN, max_sweeps=20, until="stalled"),
-        Phase("LP on invalid stars", Move.UNTANGLE, only_invalid=True, from_best=True),
+        replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled"),
+        Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True),
+        replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
+        _FOLDOVER,
     ),
     "LS": (_LAPLACIAN,),
     "US": (_LP,),
-    "CS": (Phase("Laplacian or LP", Move.COMBINED_UNTANGLE),),
+    "CS": (Phase("Laplacian or LP", (Move.COMBINED_UNTANGLE,)),),
     "LUS": (replace(_LAPLACIAN, max_sweeps=3), _LP),
+    "FF": (_FOLDOVER,),
 }
 
 
@@ -114,30 +131,33 @@ class SweepRecord:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A mesh before, after untangling and after smoothing, with the record of every sweep."""
+    """A mesh before, after untangling and after smoothing, the record of every sweep, and what cannot be mended."""
 
     before: Mesh
     untangled: Mesh
     after: Mesh
     records: tuple[SweepRecord, ...]
+    obstacles: Obstacles
 
     @property
     def valid(self) -> bool:
-        """No element of the result is inverted, by its shape or by its numbering."""
-        return self.records[-1].inverted == 0 and not self.after.topology.misnumbered.any()
+        """No element of the result is inverted, by its shape or by its numbering, and no boundary crosses itself."""
+        return self.records[-1].inverted == 0 and not (self.obstacles or self.after.topology.misnumbered.any())
 
 
 def plan(strategy: str, smooth: int = SMOOTH) -> tuple[Phase, ...]:
     """Return the phases of a strategy, and `smooth` smoothing passes."""
-    return (*STRATEGIES[strategy], Phase(SMOOTHING, Move.COMBINED_SMOOTH, smooth, until="settled", from_best=True))
+    return (*STRATEGIES[strategy], Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), smooth, until="settled", from_best=True))
 
 
 def steps(
     mesh: Mesh,
     phases: Iterable[Phase],
     *,
-    sweeps: int = SWEEPS,
+    sweeps: int | None = None,
     threshold: float | None = None,
+    max_move: float = math.inf,
+    only_invalid: bool = False,
     threads: int = 1,
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
     """Run the phases; yield the mesh and a record as it came and after each sweep.
@@ -145,14 +165,18 @@ def steps(
     A valid mesh without an angle below the threshold, but for simplices without a free vertex, is left alone.
 
     A phase that starts from the best mesh where that is not the last one begins with a record of phase "best";
-    smoothing does, so the result is never worse than the input.
+    smoothing does. The last mesh is never worse than the first, by (inverted elements, smallest measure).
 
     Parameters
     ----------
-    sweeps : int
-        Limit of the untangling sweeps, all phases together.
+    sweeps : int, optional
+        Limit of the untangling sweeps, all phases together; default: those of each phase alone.
     threshold : float, optional
         Degrees; the active-set method runs on stars with a smaller angle. Default: `THRESHOLD`.
+    max_move : float
+        No vertex goes farther from where it was, in model units.
+    only_invalid : bool
+        Move nothing but the stars of inverted elements and the rings around them, as many as it takes.
     threads : int
 
     Notes
@@ -160,29 +184,34 @@ def steps(
     Source: section 4; the combined smoothing is that of section 3.3.
     """
     degrees = THRESHOLD[mesh.dimension] if threshold is None else threshold
-    start = time.perf_counter()
-    _ = mesh.topology.stars  # built now, so that its time is not that of the first sweep
-    record = SweepRecord("input", 0, *mesh.check(threads), moved=0, seconds=time.perf_counter() - start)
-    best = mesh, record
-    yield mesh, record
-    if record.inverted == 0 and _meets_target(mesh, degrees, threads):
+    run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, threads)
+    yield run.mesh, run.record
+    if run.record.inverted == 0 and (only_invalid or _meets_target(mesh, degrees, threads)):
         return
     for phase in phases:
-        if phase.from_best and best[1].rank < record.rank:
-            mesh, record = best[0], replace(best[1], phase="best", moved=0, seconds=0.0)
-            yield mesh, record
-        waited = 0
-        for number in count(1) if phase.max_sweeps is None else range(1, phase.max_sweeps + 1):
-            if phase.until != "settled":
-                if record.inverted == 0 or sweeps == 0:
-                    break
+        untangling = phase.until != "settled"
+        if untangling and run.left == 0:
+            continue
+        limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
+        if untangling and sweeps is not None:
+            limit = sweeps if phase.max_sweeps is None else min(sweeps, phase.max_sweeps)
+        if limit > 0 and phase.from_best and run.go_back():
+            yield run.mesh, run.record
+        waited, run.clock = 0, time.perf_counter()
+        for points in islice(run.sweeps(phase), limit):
+            waited = 0 if run.add(phase, points) else waited + 1
+            yield run.mesh, run.record
+            if sweeps is not None and untangling:
                 sweeps -= 1
-            mesh, record = _sweep(mesh, phase, number, math.sin(math.radians(degrees)) ** 2, threads)
-            waited = 0 if record.inverted < best[1].inverted else waited + 1
-            best = min(best, (mesh, record), key=lambda pair: pair[1].rank)
-            yield mesh, record
-            if record.moved == 0 or (phase.until == "stalled" and waited == PATIENCE):
+            if untangling and run.left == 0:
                 break
+            if len(phase.moves) == 1 and run.record.moved == 0:
+                break
+            if phase.until == "stalled" and waited == PATIENCE * len(phase.moves):
+                break
+            run.clock = time.perf_counter()
+    if run.is_worse_than_input() and run.go_back():
+        yield run.mesh, run.record
 
 
 def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
@@ -191,39 +220,127 @@ def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
     return bool(_kernels.angles(mesh.points, free, threads)[0].min(initial=math.pi) >= math.radians(degrees))
 
 
-def _sweep(mesh: Mesh, phase: Phase, number: int, threshold_sine2: float, threads: int) -> tuple[Mesh, SweepRecord]:
-    start = time.perf_counter()
-    points = mesh.points.copy()
-    moved = sum(
-        _kernels.relocate(
-            phase.move, points, mesh.movable, mesh.topology.stars, blocks, threshold_sine2, phase.only_invalid, threads
-        )[1]
-        for blocks in mesh.topology.colours
-    )
-    mesh = mesh.with_points(points)
-    inverted, min_measure = mesh.check(threads)
-    return mesh, SweepRecord(phase.name, number, inverted, min_measure, moved, time.perf_counter() - start)
+class _Run:
+    """The mesh between two sweeps, and the best so far by what can be mended: simplices that have a free vertex."""
+
+    def __init__(self, mesh: Mesh, threshold_sine2: float, max_move: float, only_invalid: bool, threads: int) -> None:
+        import numpy as np
+
+        from meshfix_cli.foldover import Reach
+
+        self.clock = time.perf_counter()
+        self.mesh, self.threshold_sine2, self.threads = mesh, threshold_sine2, threads
+        self.reach = Reach(mesh.points, max_move)
+        simplices = mesh.topology.simplices
+        _ = mesh.topology.stars  # built now, so that its time is not that of the first sweep
+        valid = _kernels.measure(mesh.points, simplices, threads)[1].astype(bool)
+        stuck = ~(valid | mesh.movable[simplices].any(axis=1))
+        self.mendable = np.ascontiguousarray(simplices[~stuck]) if stuck.any() else simplices
+        self.beyond_repair = _kernels.check(mesh.points, np.ascontiguousarray(simplices[stuck]), threads)
+        self.left, self.measure = self._check(mesh.points)
+        self.record = self._record("input", 0, 0)
+        self.first, self.best = self.record, (mesh, self.record, (self.left, -self.measure))
+        self.fewest, self.largest = self.left, self.measure
+        self.only_invalid, self.changed = only_invalid, np.zeros(mesh.topology.n, dtype=bool)
+        self.near = mesh.movable & mesh.topology.grown(self._broken(), NEAR) if only_invalid else mesh.movable
+        # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
+        self.min_measure = -math.inf if self.record.inverted else self.measure
+
+    def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        """Yield the points after each sweep; the caller adds them before it asks for the next."""
+        self.changed[:] = False
+        return self._relocations(phase) if phase.moves else self._minimisations(phase)
+
+    def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
+        """Take the points of a sweep; return whether there was progress."""
+        self.changed = (points != self.mesh.points).any(axis=1)
+        if self.only_invalid and not phase.moves:
+            self.near = self.near | (self.mesh.movable & self.mesh.topology.grown(self.changed, 1))
+        self.mesh = self.mesh.with_points(points)
+        self.left, self.measure = self._check(points)
+        sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
+        self.record = self._record(phase.name, sweep, int(self.changed.sum()))
+        rank = (self.left, -self.measure)
+        if rank < self.best[2]:
+            self.best = (self.mesh, self.record, rank)
+        progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
+        self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
+        return progress
+
+    def go_back(self) -> bool:
+        """Return to the best mesh; False: it is the last."""
+        mesh, record, rank = self.best
+        if rank >= (self.left, -self.measure):
+            return False
+        self.mesh, (self.left, self.measure) = mesh, (rank[0], -rank[1])
+        self.record = replace(record, phase="best", moved=0, seconds=0.0)
+        return True
+
+    def is_worse_than_input(self) -> bool:
+        """By (inverted elements, smallest measure)."""
+        return self.record.rank > self.first.rank
+
+    def _check(self, points: NDArray[np.float64]) -> tuple[int, float]:
+        return _kernels.check(points, self.mendable, self.threads)
+
+    def _record(self, phase: str, sweep: int, moved: int) -> SweepRecord:
+        inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
+        return SweepRecord(phase, sweep, inverted, measure, moved, time.perf_counter() - self.clock)
+
+    def _broken(self) -> NDArray[np.bool_]:
+        """(n,) bool: the vertices of inverted simplices that can be mended."""
+        valid = _kernels.measure(self.mesh.points, self.mendable, self.threads)[1]
+        return self.mesh.topology.mark(self.mendable[valid == 0])
+
+    def _relocations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        stars, colours = self.mesh.topology.stars, self.mesh.topology.colours
+        for move in cycle(phase.moves):
+            visited = self.near
+            if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
+                visited = visited & (self._broken() | self.mesh.topology.grown(self.changed, 1))
+            points = self.mesh.points.copy()
+            for blocks in colours:
+                _kernels.relocate(
+                    move, points, visited, stars, blocks, self.threshold_sine2, self.min_measure,
+                    self.reach.start, self.reach.distance, self.threads,
+                )  # fmt: skip
+            yield points
+
+    def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        from meshfix_cli.foldover import minimisations
+
+        mesh, broken = self.mesh, self._broken()
+        for rings in phase.rings:
+            free = mesh.movable if rings is None else mesh.movable & mesh.topology.grown(broken, rings)
+            if rings is not None and 2 * free.sum() > mesh.movable.sum():
+                return  # as good as the whole mesh
+            yield from minimisations(mesh, free, self.reach, self.threads)
 
 
-def collect(run: Iterator[tuple[Mesh, SweepRecord]]) -> Outcome:
-    """Drain the generator of `steps`."""
+def collect(run: Iterator[tuple[Mesh, SweepRecord]], threads: int = 1) -> Outcome:
+    """Find what cannot be mended, then drain the generator of `steps`."""
+    from meshfix_cli.obstacles import find_obstacles
+
     mesh, record = next(run)
+    obstacles = find_obstacles(mesh, threads)
     before = untangled = mesh
     records = [record]
     for mesh, record in run:
         if record.phase != SMOOTHING:
             untangled = mesh
         records.append(record)
-    return Outcome(before, untangled, mesh, tuple(records))
+    return Outcome(before, untangled, mesh, tuple(records), obstacles)
 
 
 def untangle(
     mesh: Mesh,
     strategy: str = "auto",
     *,
-    sweeps: int = SWEEPS,
+    sweeps: int | None = None,
     smooth: int = SMOOTH,
     threshold: float | None = None,
+    max_move: float = math.inf,
+    only_invalid: bool = False,
     threads: int = 1,
 ) -> Outcome:
     """Move interior vertices until no element is inverted, then improve the worst angles.
@@ -233,19 +350,17 @@ def untangle(
     mesh : Mesh
     strategy : str
         A key of `STRATEGIES`.
-    sweeps : int
-        Limit of the untangling sweeps.
     smooth : int
         Smoothing passes.
-    threshold : float, optional
-        Degrees; see `steps`.
+    sweeps, threshold, max_move, only_invalid
+        See `steps`.
     threads : int
         The result has the same bits for any number.
 
     Returns
     -------
     Outcome
-        `Outcome.valid` tells whether the mesh could be untangled.
+        `Outcome.valid` tells whether the mesh could be untangled, `Outcome.obstacles` what makes that impossible.
 
     Raises
     ------
@@ -254,7 +369,12 @@ def untangle(
 
     Notes
     -----
-    Source: section 4 for LS, US, CS and LUS. "auto" is Laplacian sweeps until they stall, then, from the best of
-    those meshes, LP sweeps on the stars that are still invalid.
+    Source: section 4 for LS, US, CS and LUS, `foldover.py` for FF. "auto" is Laplacian sweeps until they stall; from
+    the best of those meshes cycles of LP sweeps on the stars that are still invalid; then FF, first in the smallest
+    region that can be solved.
     """
-    return collect(steps(mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, threads=threads))
+    run = steps(
+        mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, max_move=max_move,
+        only_invalid=only_invalid, threads=threads,
+    )  # fmt: skip
+    return collect(run, threads)

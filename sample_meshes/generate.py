@@ -37,12 +37,17 @@ def plate(h: float, relaxations: int = 1, seed: int = 9) -> tuple[Points, Simpli
 
 def bracket(h: float, layers: int, angle: float = 1.2) -> tuple[Points, Simplices]:
     """Return a tetrahedral mesh (n, 3), (m, 4): the plate made thick in layers and bent round by `angle`."""
-    plane, triangles = plate(h)
-    heights = np.linspace(0.0, layers * h * 0.8, layers + 1)
+    points, tets = extruded(*plate(h), np.linspace(0.0, layers * h * 0.8, layers + 1))
+    return _bent(points, angle), tets
+
+
+def extruded(plane: Points, triangles: Simplices, heights: NDArray[np.float64]) -> tuple[Points, Simplices]:
+    """Return the tetrahedra between copies of a triangle mesh at some heights."""
     count = len(plane)
     points = np.concatenate([np.column_stack([plane, np.full(count, z)]) for z in heights])
-    prisms = np.concatenate([np.hstack([triangles + k * count, triangles + (k + 1) * count]) for k in range(layers)])
-    return _bent(points, angle), _split_prisms(prisms)
+    layers = range(len(heights) - 1)
+    prisms = np.concatenate([np.hstack([triangles + k * count, triangles + (k + 1) * count]) for k in layers])
+    return points, _split_prisms(prisms)
 
 
 def _bent(points: Points, angle: float) -> Points:

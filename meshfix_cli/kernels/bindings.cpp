@@ -5,6 +5,10 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
+#include <variant>
+
+#include "crossings.hpp"
+#include "foldover.hpp"
 #include "measures.hpp"
 #include "relocate.hpp"
 #include "stars.hpp"
@@ -71,7 +75,7 @@ Star<D> make_star(const Matrix<const double>& neighbours, const Matrix<const std
     Star<D> star;
     for (std::size_t j = 0; j < neighbours.shape(0); ++j) {
         star.neighbours.push_back(load<D>(neighbours.data() + j * D));
-        star.radius = std::max(star.radius, largest_coordinate(star.neighbours.back()));
+        star.radius = std::max(star.radius, std::sqrt(norm2(star.neighbours.back())));
     }
     star.faces = faces.data();
     star.faces_count = static_cast<int>(faces.shape(0));
@@ -105,17 +109,18 @@ void init_stars(PyStars* self, const Matrix<const std::int32_t>& simplices, std:
 }
 
 auto relocate_py(int move, const Matrix<double>& points, const Vector<const bool>& movable, const PyStars& stars,
-                 const Vector<const std::int32_t>& blocks, double threshold_sine2, bool only_invalid, int threads) {
+                 const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
+                 const Matrix<const double>& start, double max_move, int threads) {
     const Stars& s = stars.stars;
     if (static_cast<int>(points.shape(1)) != stars.dimension || points.shape(0) + 1 != s.offsets.size() ||
-        movable.shape(0) != points.shape(0))
+        movable.shape(0) != points.shape(0) || start.shape(0) != points.shape(0) || start.shape(1) != points.shape(1))
         throw nb::value_error("points, movable and stars are not of the same mesh");
     const Counts counts = with_dimension(points.shape(1), [&](auto d) {
         const StarsView view{s.offsets.data(), s.faces.data(), s.neighbour_offsets.data(), s.neighbours.data()};
         return relocate<d>(static_cast<Move>(move), view, points.data(),
                            reinterpret_cast<const std::uint8_t*>(movable.data()), s.block_offsets.data(),
                            s.block_vertices.data(), blocks.data(), static_cast<std::int64_t>(blocks.shape(0)),
-                           Parameters{threshold_sine2, only_invalid}, threads);
+                           Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
     });
     return std::make_pair(counts.visited, counts.moved);
 }
@@ -159,9 +164,9 @@ auto angles_py(const Matrix<const double>& points, const Matrix<const std::int32
 }
 
 template <int D>
-auto solve_star(const Star<D>& star) {
+auto solve_star(const Star<D>& star, bool heights) {
     LinearProgram<D> program;
-    program.set(star);
+    program.set(star, heights);
     const LpStatus status = program.solve();
     std::vector<double> weights(star.faces_count + 2 * D, 0.0);
     if (status != LpStatus::degenerate)
@@ -171,15 +176,22 @@ auto solve_star(const Star<D>& star) {
             if (program.stand_in >= 0 && program.column(j) == program.column(program.stand_in)) face = program.stand_in;
             weights[side < 0 ? face : star.faces_count + side] += program.weight(row);
         }
-    std::vector<double> pi(program.pi.begin(), program.pi.end());
-    return std::make_tuple(static_cast<int>(status), std::move(pi), std::move(weights), program.pivots);
+    const Vec<D> x = program.position();
+    std::vector<double> solution(x.begin(), x.end()), frame;
+    solution.push_back(program.pi[D]);
+    for (const auto& axis : program.frame) frame.insert(frame.end(), axis.begin(), axis.end());
+    return std::make_tuple(static_cast<int>(status), std::move(solution), std::move(weights), std::move(frame),
+                           program.pivots);
 }
 
-auto linear_program_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces) {
-    auto [status, pi, weights, pivots] = with_dimension(neighbours.shape(1), [&](auto d) {
-        return solve_star<d>(make_star<d>(neighbours, faces, std::array<double, 3>{}.data()));
+auto linear_program_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+                       bool heights) {
+    const std::size_t dimension = neighbours.shape(1);
+    auto [status, solution, weights, frame, pivots] = with_dimension(dimension, [&](auto d) {
+        return solve_star<d>(make_star<d>(neighbours, faces, std::array<double, 3>{}.data()), heights);
     });
-    return std::make_tuple(status, to_numpy(std::move(pi)), to_numpy(std::move(weights)), pivots);
+    return std::make_tuple(status, to_numpy(std::move(solution)), to_numpy(std::move(weights)),
+                           to_numpy(std::move(frame), dimension), pivots);
 }
 
 auto min_norm_point_py(const Matrix<const double>& vectors) {
@@ -211,6 +223,46 @@ auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::ui
         return std::make_tuple(values, gradients, min_sine2<D>(star, star.position, 0.0));
     });
     return std::make_tuple(to_numpy(std::move(values)), to_numpy(std::move(gradients), d), smallest);
+}
+
+auto crossings_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets, int threads) {
+    return to_numpy(with_dimension(points.shape(1),
+                                   [&](auto d) {
+                                       const auto count = static_cast<std::int64_t>(facets.shape(0));
+                                       return Crossings<d>(points.data(), facets.data(), count).find(threads);
+                                   }),
+                    2);
+}
+
+// Holds the connectivity of one minimisation.
+struct PyFoldover {
+    std::variant<Foldover<2>, Foldover<3>> energy;
+};
+
+void init_foldover(PyFoldover* self, const Matrix<const std::int32_t>& simplices, std::int64_t n) {
+    const auto m = static_cast<std::int64_t>(simplices.shape(0));
+    if (simplices.shape(1) == 3) {
+        new (self) PyFoldover{Foldover<2>(simplices.data(), m, n)};
+    } else {
+        new (self) PyFoldover{Foldover<3>(simplices.data(), m, n)};
+    }
+}
+
+auto evaluate_py(PyFoldover& self, const Matrix<const double>& points, const Vector<const double>& sizes, double eps,
+                 double weight, std::int64_t free, int threads) {
+    const std::size_t d = points.shape(1);
+    std::vector<double> gradient(static_cast<std::size_t>(free) * d);
+    EnergyValue value;
+    {
+        const nb::gil_scoped_release release;
+        value = std::visit(
+            [&](auto& energy) {
+                return energy.evaluate(points.data(), sizes.data(), Regularisation{eps, weight}, free,
+                                       gradient.data(), threads);
+            },
+            self.energy);
+    }
+    return std::make_tuple(value.energy, to_numpy(std::move(gradient), d), value.min_det);
 }
 
 std::string_view view_of(const nb::bytes& data) { return {data.c_str(), data.size()}; }
@@ -313,8 +365,10 @@ NB_MODULE(_kernels, m) {
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "movable"_a.noconvert(), "stars"_a,
-          "blocks"_a.noconvert(), "threshold_sine2"_a, "only_invalid"_a, "threads"_a);
-    m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert());
+          "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
+          "threads"_a);
+    m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
+    m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
@@ -323,6 +377,11 @@ NB_MODULE(_kernels, m) {
     m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
     m.def("shortest", &shortest_py, "values"_a.noconvert(), "single"_a, "longest"_a);
     m.def("replace", &replace_py, "data"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());
+
+    nb::class_<PyFoldover>(m, "Foldover")
+        .def("__init__", &init_foldover, "simplices"_a.noconvert(), "n"_a)
+        .def("evaluate", &evaluate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a,
+             "threads"_a);
 
     nb::class_<PyStars>(m, "Stars")
         .def("__init__", &init_stars, "simplices"_a.noconvert(), "n"_a)
@@ -336,5 +395,5 @@ NB_MODULE(_kernels, m) {
         .def_prop_ro("colour_offsets", &view<&Stars::colour_offsets>)
         .def_prop_ro("colour_blocks", &view<&Stars::colour_blocks>);
 
-    static_assert(static_cast<int>(Move::combined_smooth) == 4, "the codes of untangle.Move");
+    static_assert(static_cast<int>(Move::untangle_heights) == 5, "the codes of untangle.Move");
 }

@@ -2,14 +2,16 @@
 //
 //     max t  subject to  t <= c_i + n_i . x  for every face i,   |x_k| <= box            (2.4)
 //
-// c_i (n) and n_i (n, D): determinant at the origin and its gradient, equations (2.2) and (2.3) times d!.
+// c_i (n) and n_i (n, D): determinant at the origin and its gradient, equations (2.2) and (2.3) times d!. Divided
+// by |n_i| they are the heights over the faces, which make better shapes where the star can be made valid.
 // Solved as the paper does, by the simplex method on its dual in standard form (2.5)-(2.6),
 //
 //     min c.y  subject to  A y = b, y >= 0,   A_i = (-n_i, 1),   b = (0, .., 0, 1),
 //
 // with multipliers pi = (x, t). The box adds the columns (+-e_k, 0) of cost `box`; one face and D of them are
 // feasible at once, which replaces the phase one of section 2.2 and ends open stars on the box. The revised
-// simplex method keeps the inverse of the (D+1) x (D+1) basis.
+// simplex method keeps the inverse of the (D+1) x (D+1) basis. Coordinates are those of `frame`, axes that the star
+// itself sets: neither the box nor the order of pivots depends on the axes of the mesh.
 #pragma once
 
 #include <vector>
@@ -26,6 +28,7 @@ template <int D>
 struct LinearProgram {
     using Column = std::array<double, D + 1>;
 
+    Edges<D> frame{};                   // rows: orthonormal axes
     std::vector<Vec<D, Pack>> normals;  // -n_i
     std::vector<Pack> costs;            // c_i
     double box = 0.0;
@@ -38,37 +41,40 @@ struct LinearProgram {
     Column pi{};                          // (x, t)
     int pivots = 0;
 
-    // Takes the columns from a star.
-    void set(const Star<D>& star) {
+    // Takes the columns from a star; `heights`: divided by |n_i|.
+    void set(const Star<D>& star, bool heights) {
         normals.resize(star.blocks.size());
         costs.resize(star.blocks.size());
         box = LP_BOX * star.radius;
         faces_count = static_cast<int>(star.blocks.size()) * LANES;
-        Pack shortest = constant<Pack>(INFINITY), longest = constant<Pack>(0.0), cost = constant<Pack>(box);
+        set_frame(star.neighbours);
+        Pack shortest = constant<Pack>(INFINITY), longest = constant<Pack>(0.0);
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto& p = star.blocks[b];
             costs[b] = determinant(p);
             if constexpr (D == 2) {
-                normals[b] = {p[1][1] - p[0][1], p[0][0] - p[1][0]};
+                normals[b] = turned({p[1][1] - p[0][1], p[0][0] - p[1][0]});
             } else {
-                normals[b] = cross(p[1] - p[0], p[2] - p[0]);
+                normals[b] = turned(cross(p[1] - p[0], p[2] - p[0]));
             }
             shortest = smaller(shortest, norm2(normals[b]));
             longest = larger(longest, norm2(normals[b]));
-            cost = larger(cost, larger(costs[b], costs[b] * constant<Pack>(-1.0)));
         }
         double shortest2 = INFINITY, longest2 = 0.0;
-        largest_cost = box;
         for (int i = 0; i < LANES; ++i) {
             shortest2 = std::min(shortest2, shortest[i]);
             longest2 = std::max(longest2, longest[i]);
-            largest_cost = std::max(largest_cost, cost[i]);
         }
         stand_in = -1;
         if (!(shortest2 > LP_DROPPED_FACE2 * longest2)) drop_faces(LP_DROPPED_FACE2 * longest2);
+        if (heights && longest2 > 0.0) divide_by_areas();
+        Pack cost = constant<Pack>(box);
+        for (const Pack& c : costs) cost = larger(cost, larger(c, c * constant<Pack>(-1.0)));
+        largest_cost = box;
+        for (int i = 0; i < LANES; ++i) largest_cost = std::max(largest_cost, cost[i]);
     }
 
-    // The position is pi[0..D-1], the smallest determinant there pi[D].
+    // The smallest determinant or height is pi[D].
     LpStatus solve() {
         pivots = 0;
         start();
@@ -81,6 +87,12 @@ struct LinearProgram {
             if (!exchange(entering, bland)) return LpStatus::failed;
         }
         return LpStatus::failed;
+    }
+
+    Vec<D> position() const {
+        Vec<D> x{};
+        for (int k = 0; k < D; ++k) x = x + pi[k] * frame[k];
+        return x;
     }
 
     Column column(int j) const {
@@ -98,6 +110,45 @@ struct LinearProgram {
     double weight(int row) const { return inverse[row][D]; }
 
    private:
+    // The first neighbour that is far from the centroid, the first that is far from that line.
+    void set_frame(const std::vector<Vec<D>>& neighbours) {
+        frame[0] = first_far(neighbours, Vec<D>{});
+        if constexpr (D == 2) {
+            frame[1] = {-frame[0][1], frame[0][0]};
+        } else {
+            frame[1] = first_far(neighbours, frame[0]);
+            frame[2] = cross(frame[0], frame[1]);
+        }
+    }
+
+    // Unit vector; all that is left of neighbours after `axis`. Zero where nothing is.
+    static Vec<D> first_far(const std::vector<Vec<D>>& neighbours, const Vec<D>& axis) {
+        double largest2 = 0.0;
+        for (const auto& p : neighbours) largest2 = std::max(largest2, norm2(p - dot(p, axis) * axis));
+        for (const auto& p : neighbours) {
+            const Vec<D> rest = p - dot(p, axis) * axis;
+            if (norm2(rest) > LP_AXIS2 * largest2) return (1.0 / std::sqrt(norm2(rest))) * rest;
+        }
+        return Vec<D>{};
+    }
+
+    Vec<D, Pack> turned(const Vec<D, Pack>& v) const {
+        Vec<D, Pack> w;
+        for (int k = 0; k < D; ++k) {
+            w[k] = frame[k][0] * v[0];
+            for (int c = 1; c < D; ++c) w[k] += frame[k][c] * v[c];
+        }
+        return w;
+    }
+
+    void divide_by_areas() {
+        for (std::size_t b = 0; b < costs.size(); ++b) {
+            const Pack scale = constant<Pack>(1.0) / square_root(norm2(normals[b]));
+            costs[b] = costs[b] * scale;
+            normals[b] = scale * normals[b];
+        }
+    }
+
     double cost(int j) const { return j < faces_count ? costs[j / LANES][j % LANES] : box; }
 
     Vec<D> normal(int j) const {

@@ -9,11 +9,13 @@
 
 namespace meshfix {
 
-enum class Move : int { laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth };
+enum class Move : int { laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights };
 
 struct Parameters {
     double threshold_sine2;  // combined smoothing: the active-set method runs on stars below it
-    bool only_invalid;       // visit only stars with an invalid simplex
+    double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
+    const double* start;     // (n, D): where the vertices came from
+    double max_move;         // how far from there they may be; infinity: anywhere
 };
 
 struct Counts {
@@ -30,7 +32,8 @@ struct Relocation {
     LinearProgram<D> program{};
     ActiveSet<D> active_set{};
 
-    bool store(std::int64_t v, const Vec<D>& x) {
+    bool store(std::int64_t v, Vec<D> x) {
+        if (parameters.max_move < INFINITY) x = within_reach(v, x);
         bool changed = false;
         for (int k = 0; k < D; ++k) {
             changed |= points[v * D + k] != x[k];
@@ -39,14 +42,36 @@ struct Relocation {
         return changed;
     }
 
+    // The last point in reach on the way to x. The smallest measure is concave (theorem 2.1) and the level sets of
+    // the smallest sine are convex (3.2): on the way to a better position every point is no worse than the first.
+    Vec<D> within_reach(std::int64_t v, const Vec<D>& x) const {
+        const Vec<D> start = load<D>(parameters.start + v * D), from = load<D>(points + v * D), way = x - from;
+        const double reach2 = parameters.max_move * parameters.max_move;
+        if (norm2(x - start) <= reach2) return x;
+        const Vec<D> off = from - start;
+        const double b = dot(off, way), a = norm2(way), c = std::min(0.0, norm2(off) - reach2);
+        double share = (std::sqrt(b * b - a * c) - b) / a;
+        for (int trial = 0; trial < 60; ++trial, share *= 1.0 - std::ldexp(1e-15, trial)) {
+            const Vec<D> last = from + share * way;
+            if (norm2(last - start) <= reach2) return last;
+        }
+        return from;
+    }
+
     // To the optimum of the linear programme. Also where the smallest measure stays the same: of many optima the
     // move to another is what frees collapsed clusters in a later sweep.
     bool untangle(std::int64_t v) {
-        program.set(star);
+        program.set(star, false);
         if (program.solve() != LpStatus::optimal) return false;
-        Vec<D> x;
-        for (int k = 0; k < D; ++k) x[k] = program.pi[k];
-        return store(v, star.to_global(x));
+        return store(v, star.to_global(program.position()));
+    }
+
+    // The largest smallest height where that makes the star valid, else the largest smallest measure: heights alone
+    // diverge on hard tangles.
+    bool untangle_heights(std::int64_t v) {
+        program.set(star, true);
+        if (program.solve() != LpStatus::optimal || !(program.pi[D] > 0.0)) return untangle(v);
+        return store(v, star.to_global(program.position()));
     }
 
     // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
@@ -56,30 +81,54 @@ struct Relocation {
         return (star.valid(star.position) ? false : untangle(v)) || moved;
     }
 
-    // Section 3.3: smart Laplacian first, the active-set method where the star stays below the threshold.
+    // Section 3.3: smart Laplacian first, the active-set method where the star stays below the threshold. A cluster
+    // pinched almost flat holds that up; the linear programme frees it.
     bool smooth(std::int64_t v, bool optimise) {
         double quality = min_sine2<D>(star, star.position, 0.0);
         if (!(quality > 0.0)) return false;  // only valid stars are smoothed
         Vec<D> x = smart_laplacian(star, quality);
+        if (optimise && quality < LP_PINCHED_SINE2) x = smart_programme(x, quality);
         if (optimise && quality < parameters.threshold_sine2) x = active_set.improve(star, x, quality);
-        return x == star.position ? false : store(v, star.to_global(x));
+        return x == star.position || makes_smaller(x) ? false : store(v, star.to_global(x));
+    }
+
+    // To the largest smallest height, where that raises the smallest sine.
+    Vec<D> smart_programme(const Vec<D>& x, double& quality) {
+        program.set(star, true);
+        if (program.solve() != LpStatus::optimal) return x;
+        const Vec<D> trial = star.snap(program.position());
+        const double there = min_sine2<D>(star, trial, quality);
+        if (!(there > quality)) return x;
+        quality = there;
+        return trial;
+    }
+
+    bool makes_smaller(const Vec<D>& x) const {
+        if (parameters.min_det == -INFINITY) return false;
+        const double after = min_det(x) * (D == 2 ? star.unit * star.unit : star.unit * star.unit * star.unit);
+        return after < parameters.min_det && min_det(x) < min_det(star.position);
+    }
+
+    double min_det(const Vec<D>& x) const {
+        double smallest = INFINITY;
+        for (int i = 0; i < star.faces_count; ++i) smallest = std::min(smallest, determinant(star.edges(i, x)));
+        return smallest;
     }
 
     void relocate(Move move, std::int64_t v, Counts& counts) {
-        if (move == Move::laplacian && !parameters.only_invalid) {
-            ++counts.visited;
+        ++counts.visited;
+        if (move == Move::laplacian) {
             counts.moved += store(v, centroid<D>(stars, points, v));
             return;
         }
         star.gather(stars, points, v);
-        if (parameters.only_invalid && star.valid(star.position)) return;
-        ++counts.visited;
         switch (move) {
-            case Move::laplacian: counts.moved += store(v, star.origin); break;
             case Move::untangle: counts.moved += untangle(v); break;
             case Move::combined_untangle: counts.moved += combined_untangle(v); break;
             case Move::smart_laplacian: counts.moved += smooth(v, false); break;
             case Move::combined_smooth: counts.moved += smooth(v, true); break;
+            case Move::untangle_heights: counts.moved += untangle_heights(v); break;
+            case Move::laplacian: break;
         }
     }
 };

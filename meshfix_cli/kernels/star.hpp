@@ -6,7 +6,7 @@
 // blocks          the coordinates of the faces' vertices, LANES faces side by side for the vector units; the last
 //                 block is filled up with its last face, which changes no minimum
 // position        the free vertex
-// radius          the largest coordinate of a neighbour; 0: all neighbours are in one point
+// radius          the distance of the farthest neighbour; 0: all neighbours are in one point
 #pragma once
 
 #include <cmath>
@@ -55,14 +55,14 @@ struct Star {
         faces_count = stars.offsets[v + 1] - stars.offsets[v];
         origin = centroid<D>(stars, points, v);
         neighbours.resize(end - begin);
-        double size = 0.0;
+        double size2 = 0.0;
         for (std::int32_t i = begin; i < end; ++i) {
             const Vec<D> p = load<D>(points + static_cast<std::int64_t>(stars.neighbours[i]) * D) - origin;
             neighbours[i - begin] = p;
-            size = std::max(size, largest_coordinate(p));
+            size2 = std::max(size2, norm2(p));
         }
         int exponent = 0;
-        radius = std::frexp(size, &exponent);
+        radius = std::frexp(std::sqrt(size2), &exponent);
         unit = std::ldexp(1.0, exponent);
         const double scale = 1.0 / unit;
         for (auto& p : neighbours) p = scale * p;

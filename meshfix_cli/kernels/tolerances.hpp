@@ -12,6 +12,8 @@ constexpr double LP_RANK = 1e-9;            // residual below which the normals 
 constexpr double LP_PRICING = 1e-13;        // reduced cost that still counts as negative
 constexpr double LP_PIVOT = 1e-11;          // pivot element that still counts as positive
 constexpr double LP_BOX = 1.0;              // half width of the box that bounds the vertex, in star sizes
+constexpr double LP_PINCHED_SINE2 = 3e-4;     // sine squared, of one degree: below it smoothing tries the programme
+constexpr double LP_AXIS2 = 0.1;            // squared length, of the largest, at which a neighbour may set an axis
 constexpr int LP_BLAND_AFTER = 20;          // plus one per face: pivots before Bland's rule
 constexpr int LP_MAX_PIVOTS = 1000;         // plus ten per face: never reached with Bland's rule but for rounding
 
@@ -22,6 +24,9 @@ constexpr int ACTIVE_MAX_STEPS = 20;      // stopping rule 2
 constexpr double ACTIVE_MIN_GAIN = 1e-4;  // stopping rule 3
 constexpr double ACTIVE_KKT = 1e-6;       // stopping rule 4: length of the steepest ascent direction
 constexpr double ACTIVE_ACCEPT = 0.9;     // share of the predicted gain at which a step is taken
+
+// Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d.
+constexpr double CROSSING = 1e-10;
 
 // Minimum-norm point: relative optimality gap.
 constexpr double MIN_NORM_GAP = 1e-12;

@@ -1,0 +1,159 @@
+// Facets that cross each other: segments in the plane, triangles in space. Only what is beyond doubt counts, so that
+// facets which touch (a slit, parts in contact) do not.
+//
+// points (n, D), facets (f, D) vertex numbers
+#pragma once
+
+#include <cstdint>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+#include "parallel.hpp"
+#include "simplex.hpp"
+
+namespace meshfix {
+
+// Sign of the determinant of the points; 0 where rounding could have made it.
+template <int D>
+int side(const std::array<Vec<D>, D + 1>& p) {
+    Edges<D> e;
+    for (int k = 0; k < D; ++k) e[k] = p[k + 1] - p[0];
+    const double det = determinant(e), longest2 = longest_edge2<D>(e);
+    const double doubt = CROSSING * (D == 2 ? longest2 : longest2 * std::sqrt(longest2));
+    return det > doubt ? 1 : det < -doubt ? -1 : 0;
+}
+
+inline bool cross_each_other(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c, const Vec<2>& d) {
+    return side<2>({a, b, c}) * side<2>({a, b, d}) < 0 && side<2>({c, d, a}) * side<2>({c, d, b}) < 0;
+}
+
+// Whether the segment pq goes through the inside of the triangle.
+inline bool pierces(const Vec<3>& p, const Vec<3>& q, const std::array<Vec<3>, 3>& t) {
+    if (side<3>({p, t[0], t[1], t[2]}) * side<3>({q, t[0], t[1], t[2]}) >= 0) return false;
+    const int first = side<3>({p, q, t[0], t[1]});
+    return first != 0 && first == side<3>({p, q, t[1], t[2]}) && first == side<3>({p, q, t[2], t[0]});
+}
+
+// A hierarchy of boxes over the facets, as a complete binary tree: node i has the children 2i+1 and 2i+2.
+template <int D>
+class Crossings {
+   public:
+    Crossings(const double* points, const std::int32_t* facets, std::int64_t count)
+        : points_(points), facets_(facets), order_(count) {
+        std::iota(order_.begin(), order_.end(), 0);
+        if (count > 0) build(0, 0, count);
+    }
+
+    std::vector<std::int32_t> find(int threads) const {
+        std::vector<std::vector<std::int32_t>> found(order_.size() / FACETS_PER_ITEM + 1);
+        for_each_item(static_cast<std::int64_t>(found.size()), threads, [&](std::int64_t item) {
+            const auto count = static_cast<std::int64_t>(order_.size());
+            for (std::int64_t i = item * FACETS_PER_ITEM; i < std::min(count, (item + 1) * FACETS_PER_ITEM); ++i)
+                search(0, 0, count, static_cast<std::int32_t>(i), box_of(static_cast<std::int32_t>(i)), found[item]);
+        });
+        std::vector<std::int32_t> pairs;
+        for (const auto& part : found) pairs.insert(pairs.end(), part.begin(), part.end());
+        return pairs;
+    }
+
+   private:
+    static constexpr std::int64_t LEAF = 8, FACETS_PER_ITEM = 1024;
+
+    struct Box {
+        Vec<D> low, high;
+
+        bool meets(const Box& other) const {
+            bool meets = true;
+            for (int k = 0; k < D; ++k) meets &= low[k] <= other.high[k] && other.low[k] <= high[k];
+            return meets;
+        }
+    };
+
+    Vec<D> vertex(std::int32_t facet, int k) const {
+        return load<D>(points_ + static_cast<std::int64_t>(facets_[static_cast<std::int64_t>(facet) * D + k]) * D);
+    }
+
+    Box box_of(std::int32_t facet) const {
+        Box box{vertex(facet, 0), vertex(facet, 0)};
+        for (int k = 1; k < D; ++k) {
+            const Vec<D> p = vertex(facet, k);
+            for (int c = 0; c < D; ++c) {
+                box.low[c] = std::min(box.low[c], p[c]);
+                box.high[c] = std::max(box.high[c], p[c]);
+            }
+        }
+        return box;
+    }
+
+    // Cut in two halves along the longest side of the box.
+    void build(std::size_t node, std::int64_t begin, std::int64_t end) {
+        if (boxes_.size() <= node) boxes_.resize(2 * node + 1);
+        Box box = box_of(order_[begin]);
+        for (std::int64_t i = begin + 1; i < end; ++i) {
+            const Box other = box_of(order_[i]);
+            for (int c = 0; c < D; ++c) {
+                box.low[c] = std::min(box.low[c], other.low[c]);
+                box.high[c] = std::max(box.high[c], other.high[c]);
+            }
+        }
+        boxes_[node] = box;
+        if (end - begin <= LEAF) return;
+        int axis = 0;
+        for (int c = 1; c < D; ++c)
+            if (box.high[c] - box.low[c] > box.high[axis] - box.low[axis]) axis = c;
+        const std::int64_t middle = (begin + end) / 2;
+        std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
+                         [&](std::int32_t a, std::int32_t b) {
+                             const double p = vertex(a, 0)[axis], q = vertex(b, 0)[axis];
+                             return p != q ? p < q : a < b;
+                         });
+        build(2 * node + 1, begin, middle);
+        build(2 * node + 2, middle, end);
+    }
+
+    void search(std::size_t node, std::int64_t begin, std::int64_t end, std::int32_t facet, const Box& box,
+                std::vector<std::int32_t>& found) const {
+        if (!boxes_[node].meets(box)) return;
+        if (end - begin > LEAF) {
+            const std::int64_t middle = (begin + end) / 2;
+            search(2 * node + 1, begin, middle, facet, box, found);
+            search(2 * node + 2, middle, end, facet, box, found);
+            return;
+        }
+        for (std::int64_t i = begin; i < end; ++i)
+            if (order_[i] > facet && box_of(order_[i]).meets(box) && cross(facet, order_[i]))
+                found.insert(found.end(), {facet, order_[i]});
+    }
+
+    bool shares(std::int32_t facet, std::int32_t v) const {
+        const std::int32_t* f = facets_ + static_cast<std::int64_t>(facet) * D;
+        return std::find(f, f + D, v) != f + D;
+    }
+
+    bool cross(std::int32_t a, std::int32_t b) const {
+        if constexpr (D == 2) {
+            if (shares(b, facets_[a * 2]) || shares(b, facets_[a * 2 + 1])) return false;
+            return cross_each_other(vertex(a, 0), vertex(a, 1), vertex(b, 0), vertex(b, 1));
+        } else {
+            return any_edge_pierces(a, b) || any_edge_pierces(b, a);
+        }
+    }
+
+    bool any_edge_pierces(std::int32_t a, std::int32_t b) const {
+        const std::array<Vec<3>, 3> triangle{vertex(b, 0), vertex(b, 1), vertex(b, 2)};
+        for (int k = 0; k < 3; ++k) {
+            const int next = (k + 1) % 3;
+            if (shares(b, facets_[a * 3 + k]) || shares(b, facets_[a * 3 + next])) continue;
+            if (pierces(vertex(a, k), vertex(a, next), triangle)) return true;
+        }
+        return false;
+    }
+
+    const double* points_;
+    const std::int32_t* facets_;
+    std::vector<std::int32_t> order_;
+    std::vector<Box> boxes_;
+};
+
+}  // namespace meshfix

@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
-.PHONY: help demo test lint check sanitize fuzz bench tables samples clean
+.PHONY: help demo test lint check sanitize fuzz stress bench compare tables samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -53,9 +53,15 @@ EXAMPLES ?= 5000
 fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format
 	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/test_fuzz.py
 
+stress: $(VENV)/installed ## untangle 259 hard cases; which are solved, how fast and how well
+	$(BIN)/python benchmarks/stress.py
+
 bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE for a mesh of yours; seconds to write files
 	$(BIN)/python benchmarks/kernels.py $(MESH)
 	$(BIN)/python benchmarks/files.py
+
+compare: $(VENV)/developer ## beside gmsh's UntangleMeshGeometry; MESH=FILE for a valid mesh of yours
+	$(BIN)/python benchmarks/compare.py $(MESH)
 
 tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)

@@ -33,7 +33,9 @@ def microseconds(mesh: Mesh, move: Move, repeats: int) -> float:
         points, visited = mesh.points.copy(), 0
         start = time.perf_counter()
         for blocks in mesh.topology.colours:
-            visited += _kernels.relocate(move, points, mesh.movable, stars, blocks, threshold, False, 1)[0]
+            visited += _kernels.relocate(
+                move, points, mesh.movable, stars, blocks, threshold, -math.inf, mesh.points, math.inf, 1
+            )[0]
         best = min(best, (time.perf_counter() - start) / max(visited, 1))
     return best * 1e6
 

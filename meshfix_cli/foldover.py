@@ -49,6 +49,8 @@ def minimisations(mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: in
     threads : int
         The energy and its gradient have the same bits for any number.
     """
+    if not (free.any() and reach.distance > 0):
+        return
     region = _Region(mesh, free, reach, threads)
     yield from region.minimise(mesh.points, region.uniform(mesh.points))
     embedded = _embedding(mesh, free)

@@ -18,15 +18,17 @@ ALLOWED = {
     "errors": set(),
     "mesh": {"_kernels", "errors"},
     "quality": {"_kernels", "mesh"},
-    "untangle": {"_kernels", "mesh"},
+    "obstacles": {"_kernels", "mesh"},
+    "foldover": {"_kernels", "mesh"},
+    "untangle": {"_kernels", "foldover", "mesh", "obstacles"},
     "perturb": {"mesh"},
     "meshfile": {"_kernels", "errors", "mesh"},
-    "report": {"mesh", "quality", "untangle"},
-    "cli": {"errors", "mesh", "meshfile", "perturb", "quality", "report", "untangle", "__init__"},
+    "report": {"mesh", "obstacles", "quality", "untangle"},
+    "cli": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "untangle", "__init__"},
     "__init__": {"mesh", "meshfile", "perturb", "quality", "untangle"},
     "__main__": {"cli"},
 }
-OWNERS = {"rich": {"report"}, "meshio": {"meshfile"}, "click": {"cli"}}
+OWNERS = {"rich": {"report"}, "scipy": {"foldover"}, "meshio": {"meshfile"}, "click": {"cli"}}
 
 
 def imports(path: Path) -> set[str]:

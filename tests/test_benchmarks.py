@@ -6,9 +6,11 @@ import csv
 import sys
 from pathlib import Path
 
+import compare
 import generate
 import kernels
 import pytest
+import stress
 import tables
 from conftest import SAMPLES
 
@@ -46,3 +48,35 @@ def test_samples_are_what_the_script_makes(tmp_path: Path, monkeypatch: pytest.M
     assert all(b"by generate.py" in (SAMPLES / name).read_bytes() for name in made)
     total = sum((SAMPLES / name).stat().st_size for name in made)
     assert total < 3e6
+
+
+def test_every_hard_case_that_has_a_solution_is_solved() -> None:
+    results = [stress.run(case, "auto") for case in stress.cases()]
+    assert len(results) >= 200
+    assert len({result.case.family for result in results}) >= 8
+    wrong = [result.case.name for result in results if result.verdict in (stress.FAILED, stress.WRONG)]
+    assert not wrong
+    assert [r.case.possible for r in results] == [r.verdict == stress.SOLVED for r in results]
+
+
+def test_the_stress_suite_judges_by_itself(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A strategy that cannot solve all of them fails, and the exit code says so."""
+    some = [case for case in stress.cases() if case.family == "annulus"]
+    monkeypatch.setattr(stress, "cases", lambda seed: some)
+    for strategy, code in (("LS", 1), ("FF", 0)):
+        monkeypatch.setattr(sys, "argv", ["stress.py", "--strategy", strategy, "--output", str(tmp_path / "s.csv")])
+        with pytest.raises(SystemExit) as done:
+            stress.main()
+        assert done.value.code == code
+        assert ("failed: annulus" in capsys.readouterr().out) == (code == 1)
+    assert len((tmp_path / "s.csv").read_text().splitlines()) == len(some) + 1
+
+
+def test_comparison_with_gmsh(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", ["compare.py", str(SAMPLES / "plate.vtk")])
+    compare.main()
+    printed = capsys.readouterr().out
+    assert printed.count("gmsh, unit edges") == printed.count("meshfix") - 1 == 4
+    assert "error" not in printed

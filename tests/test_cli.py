@@ -419,7 +419,40 @@ def test_elements_that_nothing_can_mend_are_counted(tmp_path: Path) -> None:
     mesh.points[a] = mesh.points[b] + mesh.points[c] - mesh.points[a]
     mesh.write(tmp_path / "in.vtk")
     text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
-    assert "of them without a free vertex" in text
+    stuck = json.loads(run("quality", "--json", tmp_path / "in.vtk", code=3).stdout)["obstacles"]["inverted"]
+    assert f"IMPOSSIBLE: {len(stuck)} of them without a free vertex" in text
+    assert str(stuck[0]) in text
+    run("untangle", "--allow-inverted", tmp_path / "in.vtk", tmp_path / "out.vtk")
+
+
+def test_a_boundary_that_crosses_itself_is_no_success(tmp_path: Path) -> None:
+    """The left half of the plate moved onto the right one; what is left valid is not called valid."""
+    mesh = meshio.read(VALID)
+    held = ~read(VALID).mesh.movable
+    hole = held & (np.linalg.norm(mesh.points[:, :2] - [0.8, 1.25], axis=1) < 0.4)
+    mesh.points[hole, 1] += 0.6
+    mesh.write(tmp_path / "in.vtk")
+    for command in (["quality"], ["untangle", "--sweeps", "20"]):
+        output = [tmp_path / "out.vtk"] if command[0] == "untangle" else []
+        text = run(*command, tmp_path / "in.vtk", *output, code=3).stdout.decode()
+        assert "IMPOSSIBLE: the fixed boundary crosses itself in " in text
+        assert "valid: no element" not in text
+        facts = json.loads(run(*command, "--json", tmp_path / "in.vtk", *output, code=3).stdout)
+        assert not facts["valid"]
+        assert len(facts["obstacles"]["crossing"]) >= 2
+
+
+def test_vertices_stay_near(tmp_path: Path) -> None:
+    arguments = ["untangle", "--max-move", "0.35", "--only-invalid", "--json", TANGLED, tmp_path / "out.vtk"]
+    done = subprocess.run([MESHFIX, *map(str, arguments)], capture_output=True, check=True)
+    far = json.loads(done.stdout)["displacement"]
+    moved = np.linalg.norm(read(tmp_path / "out.vtk").mesh.points - read(TANGLED).mesh.points, axis=1)
+    assert far["largest"] == pytest.approx(moved.max())
+    assert moved.max() <= 0.35
+    assert far["vertices"] == (moved > 0).sum()
+    assert far["mean"] == pytest.approx(moved[moved > 0].mean())
+    for wrong in ("x", "-1", "nan"):
+        error_line("untangle", "--max-move", wrong, TANGLED, tmp_path / "no.vtk", code=2)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")

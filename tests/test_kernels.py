@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections import defaultdict
 
 import numpy as np
@@ -121,17 +122,28 @@ def test_blocks_partition_and_colours_separate(fine: Mesh) -> None:
     assert len(topology.colours) > 2
 
 
+def relocate(
+    mesh: Mesh, move: Move, points: NDArray[np.float64], blocks: NDArray[np.int32],
+    only: NDArray[np.bool_] | None = None, threshold_sine2: float = 1.0, max_move: float = math.inf, threads: int = 1,
+) -> None:  # fmt: skip
+    movable = mesh.movable if only is None else only
+    _kernels.relocate(
+        move, points, movable, mesh.topology.stars, blocks, threshold_sine2, -math.inf, mesh.points, max_move, threads
+    )
+
+
 def relocated(mesh: Mesh, move: Move, threads: int, rotate: int) -> bytes:
     points = mesh.points.copy()
     for blocks in mesh.topology.colours:
         rolled = np.roll(blocks, rotate)
-        _kernels.relocate(move, points, mesh.movable, mesh.topology.stars, rolled, 0.07, False, threads)
+        relocate(mesh, move, points, rolled, threshold_sine2=0.07, threads=threads)
     return points.tobytes()
 
 
 @pytest.mark.parametrize("move", list(Move))
 def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move: Move) -> None:
-    start = tangle(fine, 5, 0.3) if move > Move.COMBINED_UNTANGLE else tangle(fine)
+    smoothing = move in (Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH)
+    start = tangle(fine, 5, 0.3) if smoothing else tangle(fine)
     expected = relocated(start, move, 1, 0)
     assert expected != start.points.tobytes()
     for threads, rotate in ((1, 1), (2, 0), (2, 2), (3, 0), (3, 1)):
@@ -143,7 +155,7 @@ def test_only_movable_vertices_move(mesh: Mesh) -> None:
     for move in Move:
         points = start.points.copy()
         for blocks in mesh.topology.colours:
-            _kernels.relocate(move, points, mesh.movable, mesh.topology.stars, blocks, 1.0, False, 1)
+            relocate(mesh, move, points, blocks)
         assert points[~mesh.movable].tobytes() == start.points[~mesh.movable].tobytes()
 
 
@@ -152,7 +164,7 @@ def test_laplacian_moves_to_the_mean_of_the_neighbours(plate: Mesh) -> None:
     only = plate.movable & (np.arange(plate.topology.n) == vertex)
     points = plate.points.copy()
     for blocks in plate.topology.colours:
-        _kernels.relocate(Move.LAPLACIAN, points, only, plate.topology.stars, blocks, 0.0, False, 1)
+        relocate(plate, Move.LAPLACIAN, points, blocks, only)
     stars = plate.topology.stars
     row = stars.neighbours[stars.neighbour_offsets[vertex] : stars.neighbour_offsets[vertex + 1]]
     np.testing.assert_allclose(points[vertex], plate.points[row].mean(axis=0), rtol=1e-14)
@@ -168,7 +180,7 @@ def test_smoothing_never_lowers_the_worst_of_a_star(mesh: Mesh, move: Move) -> N
         before, old = worst_sine(points, star), points[vertex].copy()
         only = mesh.movable & (np.arange(mesh.topology.n) == vertex)
         for blocks in mesh.topology.colours:
-            _kernels.relocate(move, points, only, stars, blocks, 1.0, False, 1)
+            relocate(mesh, move, points, blocks, only)
         after = worst_sine(points, star)
         assert after >= before * (1 - 1e-12) if before > 0 else (points[vertex] == old).all()
         improved += after > before
@@ -192,3 +204,76 @@ def test_validity_is_relative_to_the_simplex() -> None:
     tetrahedron = np.array([[0, 1, 2, 3]], dtype=np.int32)
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     assert _kernels.measure(points, tetrahedron, 1)[1][0] == 0
+
+
+@pytest.mark.parametrize("move", list(Move))
+def test_no_vertex_goes_beyond_its_reach(mesh: Mesh, move: Move) -> None:
+    start = tangle(mesh, 5, 0.3) if move in (Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH) else tangle(mesh)
+    for max_move in (0.0, 1e-9, 0.02):
+        points = start.points.copy()
+        for _ in range(3):
+            for blocks in mesh.topology.colours:
+                relocate(start, move, points, blocks, max_move=max_move)
+        far = np.linalg.norm(points - start.points, axis=1)
+        assert far.max() <= max_move
+        assert (far >= 0.99 * max_move).any()
+
+
+def test_the_linear_programme_gains_on_the_way_too(bracket: Mesh) -> None:
+    """Theorem 2.1: cut short, the way to the optimum is no worse than where it began."""
+    start = tangle(bracket)
+    stars = bracket.topology.stars
+    for vertex in np.flatnonzero(bracket.movable)[:200]:
+        star = bracket.topology.simplices[stars.incident[stars.offsets[vertex] : stars.offsets[vertex + 1]]]
+        points, only = start.points.copy(), np.arange(bracket.topology.n) == vertex
+        for blocks in bracket.topology.colours:
+            relocate(start, Move.UNTANGLE, points, blocks, only, max_move=0.03)
+        before, after = (_kernels.check(p, np.ascontiguousarray(star), 1)[1] for p in (start.points, points))
+        assert after >= before - 1e-15
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_gradient_of_the_foldover_free_energy(random: np.random.Generator, d: int) -> None:
+    """Against central differences, with regular and with inverted simplices, and for any threads."""
+    n, free = 40, 25
+    points = random.normal(size=(n, d))
+    simplices = np.array([random.permutation(n)[: d + 1] for _ in range(120)], dtype=np.int32)
+    sizes = random.uniform(0.5, 2.0, len(simplices))
+    energy = _kernels.Foldover(simplices, n)
+
+    def value(p: NDArray[np.float64]) -> float:
+        return energy.evaluate(p, sizes, 0.4, 0.3, free, 1)[0]
+
+    total, gradient, least = energy.evaluate(points, sizes, 0.4, 0.3, free, 1)
+    jacobians = np.linalg.det(points[simplices[:, 1:]] - points[simplices[:, :1]]) / sizes**d
+    assert least == pytest.approx(jacobians.min(), rel=1e-12)
+    expected = np.zeros_like(gradient)
+    for vertex, k in np.ndindex(free, d):
+        step = np.zeros_like(points)
+        step[vertex, k] = 1e-5
+        expected[vertex, k] = (value(points + step) - value(points - step)) / 2e-5
+    np.testing.assert_allclose(gradient, expected, rtol=1e-5, atol=1e-7 * np.abs(expected).max())
+    again = energy.evaluate(points, sizes, 0.4, 0.3, free, 3)
+    assert (again[0], again[1].tobytes()) == (total, gradient.tobytes())
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_the_energy_is_that_of_the_publication(random: np.random.Generator, d: int) -> None:
+    """Written out with matrices; 1 + weight * 2 for each regular simplex of its target's size, times d."""
+    regular = np.array([[0, 0], [1, 0], [0.5, math.sqrt(0.75)]])
+    if d == 3:
+        regular = np.array(
+            [[0, 0, 0], [1, 0, 0], [0.5, math.sqrt(0.75), 0], [0.5, math.sqrt(1 / 12), math.sqrt(2 / 3)]]
+        )
+    reference = (regular[1:] - regular[0]).T
+    reference /= np.linalg.det(reference) ** (1 / d)
+    simplex = np.arange(d + 1, dtype=np.int32)[None]
+    for eps in (0.0, 0.7):
+        points = random.normal(size=(d + 1, d))
+        points = points if np.linalg.det(points[1:] - points[0]) > 0 or eps > 0 else points[:, ::-1].copy()
+        jacobian = (points[1:] - points[0]).T @ np.linalg.inv(reference) / 1.7
+        det = np.linalg.det(jacobian)
+        chi = (det + math.hypot(det, eps)) / 2
+        expected = np.trace(jacobian.T @ jacobian) / chi ** (2 / d) + 0.3 * (1 + det**2) / chi
+        actual = _kernels.Foldover(simplex, d + 1).evaluate(points, np.array([1.7]), eps, 0.3, d + 1, 1)[0]
+        assert actual == pytest.approx(expected, rel=1e-12)

@@ -17,8 +17,13 @@ OPTIMAL, DEGENERATE = 0, 1
 Star = tuple[NDArray[np.float64], NDArray[np.uint16]]
 
 
-def programme(points: NDArray[np.float64], faces: NDArray[np.uint16]) -> tuple[NDArray[np.float64], ...]:
-    """Gradients (n, d) and values (n,) at the origin of the determinants, and the box."""
+Array = NDArray[np.float64]
+
+
+def programme(
+    points: Array, faces: NDArray[np.uint16], heights: bool = False
+) -> tuple[Array, Array, float, NDArray[np.bool_]]:
+    """Gradients (k, d) and values (k,) at the origin of the determinants or heights, the box, the faces (n,) kept."""
     corners = points[faces]
     values = np.linalg.det(corners)
     if points.shape[1] == 2:
@@ -26,38 +31,41 @@ def programme(points: NDArray[np.float64], faces: NDArray[np.uint16]) -> tuple[N
         gradients = np.stack([-edge[:, 1], edge[:, 0]], axis=1)
     else:
         gradients = -np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return gradients, values, np.abs(points).max()
+    sizes = np.linalg.norm(gradients, axis=1)
+    kept = sizes > 1e-12 * sizes.max()
+    gradients, values = gradients[kept], values[kept]
+    if heights:
+        gradients, values = gradients / sizes[kept, None], values / sizes[kept]
+    return gradients, values, np.linalg.norm(points, axis=1).max(), kept
 
 
-def highs(points: NDArray[np.float64], faces: NDArray[np.uint16]) -> float:
-    """Maximise t subject to t <= c_i + n_i . x in the box."""
-    gradients, values, box = programme(points, faces)
-    d = points.shape[1]
-    kept = np.linalg.norm(gradients, axis=1) > 1e-12 * np.linalg.norm(gradients, axis=1).max()
-    matrix = np.hstack([-gradients, np.ones((len(values), 1))])[kept]
+def highs(star: Star, frame: Array, heights: bool) -> float:
+    """Maximise t subject to t <= c_i + n_i . x in the box along the axes of the frame."""
+    gradients, values, box, _ = programme(*star, heights)
+    d = len(frame)
+    matrix = np.hstack([-gradients @ frame.T, np.ones((len(values), 1))])
     result = linprog(
-        [0] * d + [-1], matrix, values[kept], bounds=[(-box, box)] * d + [(None, None)], method="highs",
+        [0] * d + [-1], matrix, values, bounds=[(-box, box)] * d + [(None, None)], method="highs",
         options={"presolve": False, "primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10},
     )  # fmt: skip
     assert result.status == 0
     return float(-result.fun)
 
 
-def assert_certificate(star: Star, pi: NDArray[np.float64], weights: NDArray[np.float64]) -> None:
+def assert_certificate(star: Star, pi: Array, weights: Array, frame: Array, heights: bool) -> None:
     """Primal and dual feasible with the same value: optimal, whoever found it."""
-    points, faces = star
-    gradients, values, box = programme(points, faces)
-    d, n = points.shape[1], len(faces)
+    gradients, values, box, kept = programme(*star, heights)
+    d, n = len(frame), len(star[1])
     x, t, scale = pi[:d], pi[d], np.abs(values).max() + box
+    np.testing.assert_allclose(frame @ frame.T, np.eye(d), atol=1e-12)
     y, sides = weights[:n], weights[n:].reshape(d, 2)
-    sizes = np.linalg.norm(gradients, axis=1)
-    kept = sizes > 1e-12 * sizes.max()
-    assert (values + gradients @ x - t)[kept].min() >= -1e-11 * scale
-    assert np.abs(x).max() <= box * (1 + 1e-11)
+    assert (values + gradients @ x - t).min() >= -1e-11 * scale
+    assert np.abs(frame @ x).max() <= box * (1 + 1e-11)
     assert weights.min() >= -1e-11
     assert y.sum() == pytest.approx(1, abs=1e-10)
-    np.testing.assert_allclose(y @ gradients, sides[:, 0] - sides[:, 1], atol=1e-9 * max(1, scale))
-    assert y @ values + box * sides.sum() == pytest.approx(t, abs=1e-10 * scale)
+    assert not y[~kept].any()
+    np.testing.assert_allclose(y[kept] @ gradients @ frame.T, sides[:, 0] - sides[:, 1], atol=1e-9 * max(1, scale))
+    assert y[kept] @ values + box * sides.sum() == pytest.approx(t, abs=1e-10 * scale)
 
 
 def stars(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> Iterator[tuple[str, Star]]:
@@ -84,12 +92,15 @@ def stars(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> Iterator[t
         yield "interior" if mesh.movable[vertex] else "boundary", star_of(mesh, vertex)
 
 
-def test_every_success_carries_a_certificate(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> None:
+@pytest.mark.parametrize("heights", [False, True])
+def test_every_success_carries_a_certificate(
+    random: np.random.Generator, bracket: Mesh, plate: Mesh, heights: bool
+) -> None:
     count = 0
     statuses: dict[str, set[int]] = {}
     for kind, star in stars(random, bracket, plate):
         count += 1
-        status, pi, weights, pivots = _kernels.linear_program(*star)
+        status, pi, weights, frame, pivots = _kernels.linear_program(*star, heights)
         statuses.setdefault(kind, set()).add(status)
         if status == DEGENERATE:
             singular = np.linalg.svd(programme(*star)[0], compute_uv=False)
@@ -97,19 +108,20 @@ def test_every_success_carries_a_certificate(random: np.random.Generator, bracke
             continue
         assert status == OPTIMAL
         assert pivots < 100
-        assert_certificate(star, pi, weights)
+        assert_certificate(star, pi, weights, frame, heights)
     assert count == 5000
     assert statuses["flat"] == {DEGENERATE} == statuses["collapsed"]
     assert statuses["random"] == {OPTIMAL} == statuses["interior"]
 
 
-def test_against_highs(random: np.random.Generator, bracket: Mesh, plate: Mesh) -> None:
+@pytest.mark.parametrize("heights", [False, True])
+def test_against_highs(random: np.random.Generator, bracket: Mesh, plate: Mesh, heights: bool) -> None:
     compared = 0
     for _, star in stars(random, bracket, plate):
-        status, pi, _, _ = _kernels.linear_program(*star)
+        status, pi, _, frame, _ = _kernels.linear_program(*star, heights)
         if status == OPTIMAL:
-            scale = np.abs(programme(*star)[1]).max()
-            assert pi[-1] == pytest.approx(highs(*star), rel=1e-9, abs=1e-9 * scale)
+            scale = np.abs(programme(*star, heights)[1]).max()
+            assert pi[-1] == pytest.approx(highs(star, frame, heights), rel=1e-9, abs=1e-9 * scale)
             compared += 1
     assert compared > 4500
 
@@ -121,7 +133,7 @@ def test_regular_star_has_its_optimum_in_the_centre(d: int) -> None:
     for signs in np.ndindex(*(2,) * d):
         face = [axis + d * sign for axis, sign in enumerate(signs)]
         faces.append(face if np.linalg.det(points[face]) > 0 else [face[1], face[0], *face[2:]])
-    status, pi, _, _ = _kernels.linear_program(points, np.array(faces, dtype=np.uint16))
+    status, pi, *_ = _kernels.linear_program(points, np.array(faces, dtype=np.uint16), False)
     assert status == OPTIMAL
     np.testing.assert_allclose(pi, [0.0] * d + [1.0], atol=1e-14)
 
@@ -129,16 +141,16 @@ def test_regular_star_has_its_optimum_in_the_centre(d: int) -> None:
 def test_a_star_of_one_tetrahedron_ends_on_the_box() -> None:
     points = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
     star = points, np.array([[0, 1, 2]], dtype=np.uint16)
-    status, pi, _, _ = _kernels.linear_program(*star)
+    status, pi, *_ = _kernels.linear_program(*star, False)
     assert status == DEGENERATE  # one normal does not span space
-    assert np.abs(pi[:3]).max() <= 1.0
+    assert np.linalg.norm(pi[:3]) <= np.sqrt(3)
 
 
 @pytest.mark.parametrize("d", [2, 3])
 def test_theorem_2_1_minimum_measure_is_concave(random: np.random.Generator, d: int) -> None:
     for _ in range(200):
         points, faces = random_star(random, d, spread=1.0)
-        gradients, values, _ = programme(points, faces)
+        gradients, values, *_ = programme(points, faces)
         a, b = random.uniform(-2, 2, (2, d))
         weight = random.uniform()
         f = [(values + gradients @ x).min() for x in (a, b, weight * a + (1 - weight) * b)]

@@ -6,18 +6,20 @@ import csv
 import io
 import math
 
+import generate
 import numpy as np
 import pytest
 from conftest import tangle
+from geometries import GEOMETRIES
 from scipy.spatial.transform import Rotation
 from tables import CASES
 
-from meshfix_cli import perturb, untangle
+from meshfix_cli import _kernels, perturb, untangle
 from meshfix_cli.mesh import Mesh
 from meshfix_cli.perturb import Distance
-from meshfix_cli.quality import ceiling, evaluate, summarise
+from meshfix_cli.quality import ceiling, displacement, evaluate, summarise
 from meshfix_cli.report import history_csv
-from meshfix_cli.untangle import SMOOTHING, STRATEGIES, SWEEPS, plan, steps
+from meshfix_cli.untangle import NEAR, SMOOTHING, STRATEGIES, SWEEPS, plan, steps
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -127,6 +129,116 @@ def test_same_bits_for_any_number_of_threads(fine: Mesh) -> None:
     assert outcomes[0].valid
     assert len({o.after.points.tobytes() for o in outcomes}) == 1
     assert len({tuple((r.inverted, r.min_measure, r.moved) for r in o.records) for o in outcomes}) == 1
+
+
+def hard(mesh: Mesh) -> Mesh:
+    """All interior vertices moved by 8h: the LP and, with `strategy="FF"`, hundreds of evaluations."""
+    return tangle(mesh, 100, 8)
+
+
+@pytest.mark.parametrize("strategy", ["auto", "FF"])
+def test_same_bits_of_hard_tangles_for_any_number_of_threads(bracket: Mesh, strategy: str) -> None:
+    outcomes = [untangle(hard(bracket), strategy, threads=threads) for threads in (1, 2, 3)]
+    assert outcomes[0].valid
+    assert len({o.after.points.tobytes() for o in outcomes}) == 1
+
+
+def test_metres_millimetres_offsets_and_axes_do_not_matter(mesh: Mesh) -> None:
+    """Up to 1e-6 mean edges, the LP's moves included; at an offset of 1e6 sizes a double keeps ten digits."""
+    tangled = hard(mesh)
+    h = tangled.mean_edge_length()
+    expected = untangle(tangled)
+    assert expected.valid
+    turn = Rotation.from_euler("xyz", [20, -35, 50], degrees=True).as_matrix()
+    if mesh.dimension == 2:
+        turn = Rotation.from_euler("z", 50, degrees=True).as_matrix()[:2, :2]
+    for scale in (1e3, 1e6, 25.4):
+        scaled = untangle(Mesh.build(tangled.points * scale, tangled.topology.simplices))
+        assert np.abs(scaled.after.points / scale - expected.after.points).max() < 1e-6 * h
+    rotated = untangle(Mesh.build(tangled.points @ turn.T, tangled.topology.simplices))
+    assert np.abs(rotated.after.points @ turn - expected.after.points).max() < 1e-6 * h
+    size = float(np.ptp(tangled.points, axis=0).max())
+    shifted = untangle(Mesh.build(tangled.points + 1e6 * size, tangled.topology.simplices))
+    assert shifted.valid
+    assert np.abs(shifted.after.points - 1e6 * size - expected.after.points).max() < 1e-3 * h
+
+
+def turned_hole(angle: float) -> Mesh:
+    """An annulus whose hole was turned, its interior left behind."""
+    mesh = Mesh.build(*GEOMETRIES["annulus"]())
+    inner = ~mesh.movable & (np.linalg.norm(mesh.points, axis=1) < 0.5)
+    turn = Rotation.from_euler("z", angle, degrees=True).as_matrix()[:2, :2]
+    return mesh.with_points(np.where(inner[:, None], mesh.points @ turn.T, mesh.points))
+
+
+def test_the_global_method_solves_what_the_local_one_does_not() -> None:
+    for angle in (120, 180):
+        outcome = untangle(turned_hole(angle))
+        assert outcome.valid
+        assert any(r.phase.startswith("FF") for r in outcome.records)
+        assert not any(untangle(turned_hole(angle), strategy).valid for strategy in ("LS", "US", "CS", "LUS"))
+        assert untangle(turned_hole(angle), "FF").valid
+
+
+def test_the_energy_is_minimised_in_a_region_first() -> None:
+    """Two triangles pushed through each other in a corner of a large mesh: what is far away keeps its bits."""
+    mesh = Mesh.build(*generate.plate(0.06))
+    vertex = int(np.argmin(np.linalg.norm(mesh.points - [2.7, 1.7], axis=1)))
+    points = mesh.points.copy()
+    points[vertex] += [0.15, 0.0]
+    phases = STRATEGIES["auto"][2:]
+    *_, (after, record) = steps(mesh.with_points(points), phases)
+    assert (record.phase, record.inverted) == ("FF in regions", 0)
+    far = np.linalg.norm(mesh.points - mesh.points[vertex], axis=1) > 0.5
+    assert after.points[far].tobytes() == mesh.points[far].tobytes()
+    assert (after.points != points).any(axis=1).sum() < 60
+
+
+@pytest.mark.parametrize("strategy", ["auto", "FF"])
+def test_max_move_bounds_every_displacement(mesh: Mesh, strategy: str) -> None:
+    tangled = tangle(mesh, 5, 0.8)
+    assert tangled.check()[0] > 0
+    h = tangled.mean_edge_length()
+    free = displacement(tangled, untangle(tangled, strategy).after)["largest"]
+    for bound in (0.9 * free, 0.3 * h, 1e-3 * h, 0.0):
+        outcome = untangle(tangled, strategy, max_move=bound, sweeps=60)
+        assert displacement(tangled, outcome.after)["largest"] <= bound
+        assert outcome.records[-1].rank <= outcome.records[0].rank
+        assert outcome.valid or bound < 0.9 * free
+
+
+def test_only_invalid_moves_nothing_else(mesh: Mesh) -> None:
+    fine = Mesh.build(*(generate.plate(0.06) if mesh.dimension == 2 else generate.bracket(0.1, 8)))
+    vertex = int(np.argmin(np.linalg.norm(fine.points - fine.points[fine.movable][0], axis=1)))
+    points = fine.points.copy()
+    points[vertex] += 1.5 * fine.mean_edge_length()
+    tangled = fine.with_points(points)
+    outcome = untangle(tangled, only_invalid=True)
+    assert tangled.check()[0] > 0
+    assert outcome.valid
+    broken = np.zeros(fine.topology.n, dtype=bool)
+    broken[fine.topology.simplices[_kernels.measure(points, fine.topology.simplices, 1)[1] == 0]] = True
+    moved = (outcome.after.points != points).any(axis=1)
+    assert moved[vertex]
+    assert not (moved & ~fine.topology.grown(broken, NEAR)).any()
+    assert moved.sum() < 0.1 * fine.movable.sum()
+    assert untangle(fine, only_invalid=True, threshold=80).after is fine
+
+
+def test_a_valid_mesh_keeps_its_smallest_measure(mesh: Mesh) -> None:
+    for threshold in (30, 80):
+        outcome = untangle(mesh, threshold=threshold, smooth=10)
+        assert outcome.records[-1].rank <= outcome.records[0].rank
+
+
+def test_what_can_be_mended_is_mended_beside_what_cannot(mesh: Mesh) -> None:
+    """One vertex of a simplex without a free one is wrong; the tangle elsewhere is solved all the same."""
+    stuck = with_an_inverted_fixed_simplex(mesh)
+    both = stuck.with_points(np.where(mesh.movable[:, None], tangle(mesh).points, stuck.points))
+    outcome = untangle(both)
+    assert len(outcome.obstacles.inverted) >= 1
+    assert not outcome.valid
+    assert outcome.records[-1].inverted <= untangle(stuck).records[-1].inverted + 1 < both.check()[0]
 
 
 @pytest.mark.parametrize("scale", [1e-6, 25.4, 1e6])

@@ -253,7 +253,7 @@ class _Run:
 
     def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
         """Take the points of a sweep; return whether there was progress."""
-        self.changed = (points != self.mesh.points).any(axis=1)
+        self.changed = self.mesh.movable & (points != self.mesh.points).any(axis=1)
         if self.only_invalid and not phase.moves:
             self.near = self.near | (self.mesh.movable & self.mesh.topology.grown(self.changed, 1))
         self.mesh = self.mesh.with_points(points)

@@ -76,6 +76,8 @@ class _Group(click.Group):
     """Errors are one line on stderr and an exit code, never a traceback; signals leave no temporary file."""
 
     def invoke(self, ctx: click.Context) -> Any:
+        for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # read when numpy and scipy are loaded, later
+            os.environ[name] = "1"  # with more, sums have other bits, and nothing here is large enough to gain
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) != signal.SIG_IGN:  # as nohup does
                 signal.signal(getattr(signal, name), _stop)

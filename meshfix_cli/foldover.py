@@ -47,7 +47,8 @@ def minimisations(mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: in
         The vertices that move; the region is their stars.
     reach : Reach
     threads : int
-        The energy and its gradient have the same bits for any number.
+        The energy and its gradient have the same bits for any number; those of the minimiser's sums depend on the
+        threads of BLAS where there are more than some thousand vertices, so the command line allows it one.
     """
     if not (free.any() and reach.distance > 0):
         return

@@ -316,7 +316,7 @@ def main() -> None:
 @click.option(
     "--sweeps",
     type=click.IntRange(0),
-    help="Untangling sweeps at most. [default: 40; auto and FF stop when they stall]",
+    help="Untangling sweeps at most, all phases together. [default: as each needs]",
 )
 @click.option("--smooth", type=click.IntRange(0), default=SMOOTH, show_default=True, help="Smoothing passes.")
 @click.option(
@@ -325,7 +325,7 @@ def main() -> None:
     metavar="DEGREES",
     help=f"Optimise stars with smaller angles. [default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
 )
-@click.option("--max-move", type=_Distance(), help="Move no vertex farther: 0.5h is half a mean edge length.")
+@click.option("--max-move", type=_Distance(), help="Move no vertex farther; 0.5h: half a mean edge of INPUT.")
 @click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them.")
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
@@ -377,7 +377,9 @@ def untangle(
     if cells is not None:
         _write_cells(document, result, cells, show.threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
-    facts = {"strategy": strategy, "displacement": displacement(outcome.before, result)}
+    facts: dict[str, Any] = {"strategy": strategy, "displacement": displacement(outcome.before, result)}
+    if max_move is not None:
+        facts["max_move"] = reach
     report = show.report("untangle", document, stages, notes, requirements, records=outcome.records, facts=facts)
     show.print(report, files.report_stream)
     sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)

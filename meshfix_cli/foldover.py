@@ -104,9 +104,8 @@ class _Region:
     def uniform(self, points: Array) -> Array:
         """Return the same size for all: the region's signed measure, which its boundary fixes, in equal parts."""
         measure = _kernels.measure(points, self.global_simplices, self.threads)[0]
-        mean = measure.sum() / len(measure)
-        if not mean > 0:  # a region whose own boundary is turned inside out
-            mean = np.abs(measure).mean()
+        # A region whose own boundary is turned inside out may have no measure, or a negative one.
+        mean = max(measure.mean(), 1e-3 * np.abs(measure).mean())
         return np.full(len(measure), max(mean, np.finfo(float).tiny) ** (1 / points.shape[1]))
 
     def sizes(self, points: Array) -> Array:
@@ -178,8 +177,11 @@ class _Problem:
     def points(self, x: Array) -> Array:
         """Return all points of the mesh (n, d)."""
         points = self.all.copy()
-        moved = self.ball.positions(x.reshape(-1, points.shape[1]))
-        points[self.region.vertices[: self.region.free]] = self.origin + self.unit * moved
+        moved = self.origin + self.unit * self.ball.positions(x.reshape(-1, points.shape[1]))
+        moving, reach = self.region.vertices[: self.region.free], self.region.reach
+        start = reach.start[moving]
+        outside = np.linalg.norm(moved - start, axis=1) > reach.distance  # by rounding
+        points[moving] = np.where(outside[:, None], start, moved)
         return points
 
     def minimise(self, x: Array, eps: float) -> Array:

@@ -13,14 +13,15 @@ from meshfix_cli.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Obstacles:
-    """Simplices, by their rows, that no position of the free vertices makes valid.
+    """Simplices, by their rows, that no position of the free vertices mends.
 
     Attributes
     ----------
     inverted : (k,) int64
         Inverted simplices without a free vertex.
     crossing : (c, 2) int64
-        Pairs of simplices of one part that have fixed facets which cross each other.
+        Pairs of simplices of one part that have fixed facets which cross each other: the part overlaps itself, even
+        where all of its simplices are positive. Each facet's first 16 crossings are looked for.
     """
 
     inverted: NDArray[np.int64]
@@ -41,6 +42,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     valid = _kernels.measure(mesh.points, np.ascontiguousarray(topology.simplices[rows]), threads)[1]
     facets, owners = _fixed_facets(mesh, fixed)
     pairs = owners[_kernels.crossings(mesh.points, facets, threads)]
+    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
     return Obstacles(rows[valid == 0], pairs[topology.component[pairs[:, 0]] == topology.component[pairs[:, 1]]])
 
 

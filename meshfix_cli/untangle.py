@@ -28,7 +28,7 @@ THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrah
 SMOOTHING = "smoothing"
 PATIENCE = 3  # turns through the moves of a phase without progress after which it has stalled
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
-NEAR = 2  # rings around invalid simplices that `only_invalid` lets move, and one around what moved
+NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
 
 
 class Move(IntEnum):
@@ -239,10 +239,11 @@ class _Run:
         self.beyond_repair = _kernels.check(mesh.points, np.ascontiguousarray(simplices[stuck]), threads)
         self.left, self.measure = self._check(mesh.points)
         self.record = self._record("input", 0, 0)
+        self.first_left = self.left
         self.first, self.best = self.record, (mesh, self.record, (self.left, -self.measure))
         self.fewest, self.largest = self.left, self.measure
         self.only_invalid, self.changed = only_invalid, np.zeros(mesh.topology.n, dtype=bool)
-        self.near = mesh.movable & mesh.topology.grown(self._broken(), NEAR) if only_invalid else mesh.movable
+        self.near = mesh.movable & self._broken() if only_invalid else mesh.movable
         # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
 
@@ -255,14 +256,14 @@ class _Run:
         """Take the points of a sweep; return whether there was progress."""
         self.changed = self.mesh.movable & (points != self.mesh.points).any(axis=1)
         if self.only_invalid and not phase.moves:
-            self.near = self.near | (self.mesh.movable & self.mesh.topology.grown(self.changed, 1))
+            self.near = self.near | self.changed
         self.mesh = self.mesh.with_points(points)
         self.left, self.measure = self._check(points)
         sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
         self.record = self._record(phase.name, sweep, int(self.changed.sum()))
-        rank = (self.left, -self.measure)
-        if rank < self.best[2]:
-            self.best = (self.mesh, self.record, rank)
+        # With as many inverted elements as in the input nothing is mended: no reason to move what is well.
+        if (self.left, -self.measure) < self.best[2] and self.left < self.first_left:
+            self.best = (self.mesh, self.record, (self.left, -self.measure))
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
@@ -293,9 +294,11 @@ class _Run:
         return self.mesh.topology.mark(self.mendable[valid == 0])
 
     def _relocations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        stars, colours = self.mesh.topology.stars, self.mesh.topology.colours
+        stars, colours, near = self.mesh.topology.stars, self.mesh.topology.colours, self.near
+        if self.only_invalid and phase.until == "settled":
+            near = self.mesh.movable & self.mesh.topology.grown(near, NEAR)
         for move in cycle(phase.moves):
-            visited = self.near
+            visited = near
             if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
                 visited = visited & (self._broken() | self.mesh.topology.grown(self.changed, 1))
             points = self.mesh.points.copy()

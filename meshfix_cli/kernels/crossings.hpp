@@ -50,7 +50,8 @@ class Crossings {
         for_each_item(static_cast<std::int64_t>(found.size()), threads, [&](std::int64_t item) {
             const auto count = static_cast<std::int64_t>(order_.size());
             for (std::int64_t i = item * FACETS_PER_ITEM; i < std::min(count, (item + 1) * FACETS_PER_ITEM); ++i)
-                search(0, 0, count, static_cast<std::int32_t>(i), box_of(static_cast<std::int32_t>(i)), found[item]);
+                search(0, 0, count, static_cast<std::int32_t>(i), box_of(static_cast<std::int32_t>(i)),
+                       found[item].size() + 2 * CROSSINGS_PER_FACET, found[item]);
         });
         std::vector<std::int32_t> pairs;
         for (const auto& part : found) pairs.insert(pairs.end(), part.begin(), part.end());
@@ -112,13 +113,14 @@ class Crossings {
         build(2 * node + 2, middle, end);
     }
 
+    // Appends pairs until there are `full` numbers.
     void search(std::size_t node, std::int64_t begin, std::int64_t end, std::int32_t facet, const Box& box,
-                std::vector<std::int32_t>& found) const {
-        if (!boxes_[node].meets(box)) return;
+                std::size_t full, std::vector<std::int32_t>& found) const {
+        if (found.size() >= full || !boxes_[node].meets(box)) return;
         if (end - begin > LEAF) {
             const std::int64_t middle = (begin + end) / 2;
-            search(2 * node + 1, begin, middle, facet, box, found);
-            search(2 * node + 2, middle, end, facet, box, found);
+            search(2 * node + 1, begin, middle, facet, box, full, found);
+            search(2 * node + 2, middle, end, facet, box, full, found);
             return;
         }
         for (std::int64_t i = begin; i < end; ++i)

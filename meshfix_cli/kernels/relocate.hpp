@@ -77,7 +77,7 @@ struct Relocation {
     // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
     bool combined_untangle(std::int64_t v) {
         const bool moved = store(v, star.origin);
-        star.position = Vec<D>{};
+        star.position = (1.0 / star.unit) * (load<D>(points + v * D) - star.origin);
         return (star.valid(star.position) ? false : untangle(v)) || moved;
     }
 
@@ -105,8 +105,8 @@ struct Relocation {
 
     bool makes_smaller(const Vec<D>& x) const {
         if (parameters.min_det == -INFINITY) return false;
-        const double after = min_det(x) * (D == 2 ? star.unit * star.unit : star.unit * star.unit * star.unit);
-        return after < parameters.min_det && min_det(x) < min_det(star.position);
+        const double after = min_det(x), scale = D == 2 ? star.unit * star.unit : star.unit * star.unit * star.unit;
+        return after * scale < parameters.min_det && after < min_det(star.position);
     }
 
     double min_det(const Vec<D>& x) const {

@@ -1,6 +1,8 @@
 // Every tolerance of the kernels, dimensionless, in one place.
 #pragma once
 
+#include <cstddef>
+
 namespace meshfix {
 
 // A simplex is valid if det > VALID * (longest edge)^d: ten times the rounding error of the determinant.
@@ -25,8 +27,10 @@ constexpr double ACTIVE_MIN_GAIN = 1e-4;  // stopping rule 3
 constexpr double ACTIVE_KKT = 1e-6;       // stopping rule 4: length of the steepest ascent direction
 constexpr double ACTIVE_ACCEPT = 0.9;     // share of the predicted gain at which a step is taken
 
-// Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d.
-constexpr double CROSSING = 1e-10;
+// Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:
+// files of six digits, or in single precision, make facets that only touch interpenetrate by less.
+constexpr double CROSSING = 1e-5;
+constexpr std::size_t CROSSINGS_PER_FACET = 16;  // that are looked for; a tangled boundary has no end of them
 
 // Minimum-norm point: relative optimality gap.
 constexpr double MIN_NORM_GAP = 1e-12;

@@ -1,4 +1,4 @@
-"""Hard tangles of many geometries: `make stress`, or `python benchmarks/stress.py [--strategy NAME] [--verbose]`.
+"""Hard tangles of many geometries: `make stress`, or `python benchmarks/stress.py [--strategy NAME]`.
 
 Every case starts from a mesh that is valid by construction, so it has a solution, but for those of the family
 "impossible". A case is solved where no element is inverted and no facet folded, and the fixed vertices have not

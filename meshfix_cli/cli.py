@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh import Mesh
     from meshfix_cli.meshfile import Document
     from meshfix_cli.meshfile.formats import Format
+    from meshfix_cli.obstacles import Obstacles
     from meshfix_cli.quality import Requirement
     from meshfix_cli.report import Report
     from meshfix_cli.untangle import Outcome
@@ -215,6 +216,7 @@ class _Show:
         stages: Mapping[str, Mesh],
         notes: tuple[str, ...] = (),
         requirements: tuple[Requirement, ...] = (),
+        obstacles: Obstacles | None = None,
         **more: Any,
     ) -> Report:
         from meshfix_cli.obstacles import find_obstacles
@@ -231,7 +233,7 @@ class _Show:
             ids=document.ids,
             stages={stage: summarise(mesh, metrics, self.threads) for stage, mesh in stages.items()},
             ceiling=ceiling(result, self.threads),
-            obstacles=find_obstacles(result, self.threads),
+            obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
             fixed=document.fixed,
             notes=(*document.notes, *notes),
             requirements=requirements,
@@ -380,7 +382,9 @@ def untangle(
     facts: dict[str, Any] = {"strategy": strategy, "displacement": displacement(outcome.before, result)}
     if max_move is not None:
         facts["max_move"] = reach
-    report = show.report("untangle", document, stages, notes, requirements, records=outcome.records, facts=facts)
+    report = show.report(
+        "untangle", document, stages, notes, requirements, outcome.obstacles, records=outcome.records, facts=facts
+    )
     show.print(report, files.report_stream)
     sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 

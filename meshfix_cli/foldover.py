@@ -91,10 +91,8 @@ class _Region:
 
     def __init__(self, mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
         simplices = mesh.topology.simplices[free[mesh.topology.simplices].any(axis=1)]
-        used = np.zeros_like(free)
-        used[simplices] = True
-        self.vertices = np.concatenate([np.flatnonzero(free), np.flatnonzero(used & ~free)])
-        self.free = int(free.sum())
+        self.moving = np.flatnonzero(free)
+        self.vertices = np.concatenate([self.moving, np.flatnonzero(mesh.topology.mark(simplices) & ~free)])
         number = np.full(len(free), -1, dtype=np.int32)
         number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
         self.global_simplices = np.ascontiguousarray(simplices)
@@ -122,18 +120,18 @@ class _Region:
         """Yield the points after each minimisation; eps falls by the paper's rule in between."""
         problem = _Problem(self, start, sizes * math.factorial(start.shape[1]) ** (1 / start.shape[1]))
         x = problem.start
-        _, least = problem.evaluate(x, 1.0)
-        eps = max(1.0, -0.2 * least)
+        problem.evaluate(x, 1.0)
+        eps = max(1.0, -0.2 * problem.least)
         for _ in range(MINIMISATIONS):
             before, _ = problem.evaluate(x, eps)
             x = problem.minimise(x, eps)
-            after, least = problem.evaluate(x, eps)
-            if not (math.isfinite(after) and math.isfinite(least)):
+            after, _ = problem.evaluate(x, eps)
+            if not (math.isfinite(after) and math.isfinite(problem.least)):
                 return
             yield problem.points(x)
-            if least > 0 and abs(before - after) < 1e-5 * abs(after):
+            if problem.least > 0 and abs(before - after) < 1e-5 * abs(after):
                 return
-            eps = _next_eps(eps, least, before, after)
+            eps = _next_eps(eps, problem.least, before, after)
 
 
 def _next_eps(eps: float, least: float, before: float, after: float) -> float:
@@ -148,7 +146,7 @@ class _Valid(Exception):
 
 
 class _Problem:
-    """The energy as a function of a vector x (free * d,)."""
+    """The energy as a function of a vector x (free * d,); `least`: the smallest determinant where it was last asked."""
 
     def __init__(self, region: _Region, points: Array, sizes: Array) -> None:
         self.region, self.all = region, points
@@ -156,32 +154,26 @@ class _Problem:
         self.sizes = sizes / self.unit
         self.local = np.ascontiguousarray((points[region.vertices] - self.origin) / self.unit)
         self.least = -math.inf
-        moving = region.vertices[: region.free]
-        self.ball = _Ball((region.reach.start[moving] - self.origin) / self.unit, region.reach.distance / self.unit)
-        self.start = self.ball.parameters(self.local[: region.free]).ravel()
+        start, distance = region.reach.start[region.moving], region.reach.distance
+        self.ball = _Ball((start - self.origin) / self.unit, distance / self.unit)
+        self.start = self.ball.parameters(self.local[: len(start)]).ravel()
 
-    def _evaluate(self, x: Array, eps: float) -> tuple[float, Array, float]:
+    def evaluate(self, x: Array, eps: float) -> tuple[float, Array]:
+        """Return the energy and its gradient."""
         u = x.reshape(-1, self.local.shape[1])
-        self.local[: self.region.free] = self.ball.positions(u)
-        energy, gradient, least = self.region.energy.evaluate(
-            self.local, self.sizes, eps, WEIGHT, self.region.free, self.region.threads
+        self.local[: len(u)] = self.ball.positions(u)
+        energy, gradient, self.least = self.region.energy.evaluate(
+            self.local, self.sizes, eps, WEIGHT, len(u), self.region.threads
         )
-        self.least = least
-        return energy, self.ball.pulled_back(u, gradient).ravel(), least
-
-    def evaluate(self, x: Array, eps: float) -> tuple[float, float]:
-        """Return the energy and the smallest determinant."""
-        energy, _, least = self._evaluate(x, eps)
-        return energy, least
+        return energy, self.ball.pulled_back(u, gradient).ravel()
 
     def points(self, x: Array) -> Array:
         """Return all points of the mesh (n, d)."""
         points = self.all.copy()
         moved = self.origin + self.unit * self.ball.positions(x.reshape(-1, points.shape[1]))
-        moving, reach = self.region.vertices[: self.region.free], self.region.reach
-        start = reach.start[moving]
-        outside = np.linalg.norm(moved - start, axis=1) > reach.distance  # by rounding
-        points[moving] = np.where(outside[:, None], start, moved)
+        start = self.region.reach.start[self.region.moving]
+        outside = np.linalg.norm(moved - start, axis=1) > self.region.reach.distance  # by rounding
+        points[self.region.moving] = np.where(outside[:, None], start, moved)
         return points
 
     def minimise(self, x: Array, eps: float) -> Array:
@@ -196,13 +188,10 @@ class _Problem:
                 valid.append(x.copy())
                 raise _Valid
 
-        def function(x: Array) -> tuple[float, Array]:
-            return self._evaluate(x, eps)[:2]
-
         try:
             return fmin_l_bfgs_b(
-                function, x, m=MEMORY, maxiter=ITERATIONS, maxfun=2 * ITERATIONS, factr=1e7, pgtol=1e-8,
-                callback=stop_where_valid,
+                self.evaluate, x, args=(eps,), m=MEMORY, maxiter=ITERATIONS, maxfun=2 * ITERATIONS, factr=1e7,
+                pgtol=1e-8, callback=stop_where_valid,
             )[0]  # fmt: skip
         except _Valid:
             return valid[0]

@@ -195,7 +195,7 @@ def steps(
         limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
         if untangling and sweeps is not None:
             limit = sweeps if phase.max_sweeps is None else min(sweeps, phase.max_sweeps)
-        if limit > 0 and phase.from_best and run.go_back():
+        if limit > 0 and phase.from_best and run.go_back(untangling):
             yield run.mesh, run.record
         waited, run.clock = 0, time.perf_counter()
         for points in islice(run.sweeps(phase), limit):
@@ -210,7 +210,7 @@ def steps(
             if phase.until == "stalled" and waited == PATIENCE * len(phase.moves):
                 break
             run.clock = time.perf_counter()
-    if run.is_worse_than_input() and run.go_back():
+    if run.record.rank > run.first[1].rank and run.go_back(untangling=False):
         yield run.mesh, run.record
 
 
@@ -239,8 +239,7 @@ class _Run:
         self.beyond_repair = _kernels.check(mesh.points, np.ascontiguousarray(simplices[stuck]), threads)
         self.left, self.measure = self._check(mesh.points)
         self.record = self._record("input", 0, 0)
-        self.first_left = self.left
-        self.first, self.best = self.record, (mesh, self.record, (self.left, -self.measure))
+        self.first = self.best = (mesh, self.record, (self.left, -self.measure))
         self.fewest, self.largest = self.left, self.measure
         self.only_invalid, self.changed = only_invalid, np.zeros(mesh.topology.n, dtype=bool)
         self.near = mesh.movable & self._broken() if only_invalid else mesh.movable
@@ -261,25 +260,24 @@ class _Run:
         self.left, self.measure = self._check(points)
         sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
         self.record = self._record(phase.name, sweep, int(self.changed.sum()))
-        # With as many inverted elements as in the input nothing is mended: no reason to move what is well.
-        if (self.left, -self.measure) < self.best[2] and self.left < self.first_left:
-            self.best = (self.mesh, self.record, (self.left, -self.measure))
+        self.best = min(self.best, (self.mesh, self.record, (self.left, -self.measure)), key=lambda one: one[2])
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
 
-    def go_back(self) -> bool:
-        """Return to the best mesh; False: it is the last."""
-        mesh, record, rank = self.best
-        if rank >= (self.left, -self.measure):
+    def go_back(self, untangling: bool) -> bool:
+        """Return to the best mesh; False: it is the last.
+
+        When untangling is over and left as many inverted elements as there were, nothing was mended, and the best is
+        the input: what is well in it was moved for nothing.
+        """
+        mended = self.best[2][0] < self.first[2][0]
+        mesh, record, rank = self.best if untangling or mended else self.first
+        if mesh is self.mesh:
             return False
         self.mesh, (self.left, self.measure) = mesh, (rank[0], -rank[1])
         self.record = replace(record, phase="best", moved=0, seconds=0.0)
         return True
-
-    def is_worse_than_input(self) -> bool:
-        """By (inverted elements, smallest measure)."""
-        return self.record.rank > self.first.rank
 
     def _check(self, points: NDArray[np.float64]) -> tuple[int, float]:
         return _kernels.check(points, self.mendable, self.threads)

@@ -241,6 +241,23 @@ def test_what_can_be_mended_is_mended_beside_what_cannot(mesh: Mesh) -> None:
     assert outcome.records[-1].inverted <= untangle(stuck).records[-1].inverted + 1 < both.check()[0]
 
 
+def test_where_nothing_is_mended_nothing_else_suffers(plate: Mesh) -> None:
+    """A boundary vertex on its neighbour: the element between them has no area, wherever the free vertices go."""
+    simplices = plate.topology.simplices
+    a, b = next(
+        pair for row in simplices for pair in zip(row, np.roll(row, 1), strict=True)
+        if not plate.movable[[*pair]].any() and plate.movable[row].any()
+    )  # fmt: skip
+    points = plate.points.copy()
+    points[a] = points[b]
+    stuck = plate.with_points(points)
+    outcome = untangle(stuck)
+    before, after = summarise(stuck), summarise(outcome.after)
+    assert not outcome.valid
+    assert (after.inverted, outcome.untangled.points.tobytes()) == (before.inverted, points.tobytes())
+    assert after.percentile_1 >= before.percentile_1
+
+
 @pytest.mark.parametrize("scale", [1e-6, 25.4, 1e6])
 def test_unit_of_length_does_not_matter(mesh: Mesh, scale: float) -> None:
     tangled = tangle(mesh)

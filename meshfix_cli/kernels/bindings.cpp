@@ -226,12 +226,10 @@ auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::ui
 }
 
 auto crossings_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets, int threads) {
-    return to_numpy(with_dimension(points.shape(1),
-                                   [&](auto d) {
-                                       const auto count = static_cast<std::int64_t>(facets.shape(0));
-                                       return Crossings<d>(points.data(), facets.data(), count).find(threads);
-                                   }),
-                    2);
+    const auto count = static_cast<std::int64_t>(facets.shape(0));
+    std::vector<std::int32_t> pairs = with_dimension(
+        points.shape(1), [&](auto d) { return Crossings<d>(points.data(), facets.data(), count).find(threads); });
+    return to_numpy(std::move(pairs), 2);
 }
 
 // Holds the connectivity of one minimisation.

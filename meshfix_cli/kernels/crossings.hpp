@@ -14,7 +14,7 @@
 
 namespace meshfix {
 
-// Sign of the determinant of the points; 0 where rounding could have made it.
+// Sign of the determinant of the points; 0 where rounding, here or in a file, could have made it.
 template <int D>
 int side(const std::array<Vec<D>, D + 1>& p) {
     Edges<D> e;
@@ -64,6 +64,12 @@ class Crossings {
     struct Box {
         Vec<D> low, high;
 
+        void add(const Vec<D>& p) {
+            for (int k = 0; k < D; ++k) {
+                low[k] = std::min(low[k], p[k]);
+                high[k] = std::max(high[k], p[k]);
+            }
+        }
         bool meets(const Box& other) const {
             bool meets = true;
             for (int k = 0; k < D; ++k) meets &= low[k] <= other.high[k] && other.low[k] <= high[k];
@@ -77,13 +83,7 @@ class Crossings {
 
     Box box_of(std::int32_t facet) const {
         Box box{vertex(facet, 0), vertex(facet, 0)};
-        for (int k = 1; k < D; ++k) {
-            const Vec<D> p = vertex(facet, k);
-            for (int c = 0; c < D; ++c) {
-                box.low[c] = std::min(box.low[c], p[c]);
-                box.high[c] = std::max(box.high[c], p[c]);
-            }
-        }
+        for (int k = 1; k < D; ++k) box.add(vertex(facet, k));
         return box;
     }
 
@@ -93,10 +93,8 @@ class Crossings {
         Box box = box_of(order_[begin]);
         for (std::int64_t i = begin + 1; i < end; ++i) {
             const Box other = box_of(order_[i]);
-            for (int c = 0; c < D; ++c) {
-                box.low[c] = std::min(box.low[c], other.low[c]);
-                box.high[c] = std::max(box.high[c], other.high[c]);
-            }
+            box.add(other.low);
+            box.add(other.high);
         }
         boxes_[node] = box;
         if (end - begin <= LEAF) return;

@@ -28,13 +28,14 @@ TARGETS = {Move.LAPLACIAN: 0.05, Move.UNTANGLE: 1.5, Move.COMBINED_SMOOTH: 1.5} 
 def microseconds(mesh: Mesh, move: Move, repeats: int) -> float:
     """Return the best time per visited vertex."""
     threshold = math.sin(math.radians(THRESHOLD[mesh.dimension])) ** 2
-    stars, best = mesh.topology.stars, math.inf
+    stars, best = mesh.topology.stars(), math.inf
+    start_points, movable = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
     for _ in range(repeats):
-        points, visited = mesh.points.copy(), 0
+        points, visited = start_points.copy(), 0
         start = time.perf_counter()
         for blocks in mesh.topology.colours:
             visited += _kernels.relocate(
-                move, points, mesh.movable, stars, blocks, threshold, -math.inf, mesh.points, math.inf, 1
+                move, points, movable, stars, blocks, threshold, -math.inf, start_points, math.inf, 1
             )[0]
         best = min(best, (time.perf_counter() - start) / max(visited, 1))
     return best * 1e6

@@ -7,14 +7,52 @@ Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
 
-class Stars:
-    """Stars, blocks and block colours of a mesh; the arrays are described in kernels/stars.hpp."""
+BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
 
-    def __init__(self, simplices: Int32, n: int) -> None: ...
+class Connectivity:
+    """A mesh in the order of the kernels; the arrays are described in kernels/order.hpp, facets.hpp and stars.hpp.
+
+    All of them are views; faces and what follows it are empty until the stars are built.
+    """
+
+    def __init__(self, points: Float64, simplices: Int32, threads: int) -> None: ...
+    def flip(self, flipped: NDArray[np.bool_], threads: int) -> None:
+        """Give some simplices (m,) the other orientation."""
+
+    def build_stars(self, threads: int) -> None:
+        """Do it, where it is not done; ValueError where a star or the mesh is too large to be numbered."""
+
+    def grown(self, mask: NDArray[np.bool_], rings: int) -> NDArray[np.uint8]:
+        """Mark these vertices (n,) and rings of neighbours."""
+
+    def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32]:
+        """Facets (f, d) without a movable vertex, each once, and a simplex of each."""
+
+    def summarise(self, points: Float64, threads: int) -> tuple[Float64, Int32, int, float, float]:
+        """Smallest angle (m,) in radians, inverted simplices, folded facets, smallest measure, largest angle."""
+
+    @property
+    def crowded(self) -> int:
+        """A corner whose facet is shared by too many simplices, then there is no more; or -1."""
+
+    @property
+    def orientable(self) -> bool: ...
+    @property
+    def vertices(self) -> Int32: ...
+    @property
+    def rows(self) -> Int32: ...
+    @property
+    def simplices(self) -> Int32: ...
+    @property
+    def mates(self) -> Int32: ...
+    @property
+    def component(self) -> Int32: ...
+    @property
+    def against(self) -> NDArray[np.uint8]: ...
     @property
     def offsets(self) -> Int32: ...
     @property
-    def incident(self) -> Int32: ...
+    def corners(self) -> Int32: ...
     @property
     def faces(self) -> NDArray[np.uint16]: ...
     @property
@@ -22,22 +60,15 @@ class Stars:
     @property
     def neighbours(self) -> Int32: ...
     @property
-    def block_offsets(self) -> Int32: ...
-    @property
-    def block_vertices(self) -> Int32: ...
-    @property
     def colour_offsets(self) -> Int32: ...
     @property
     def colour_blocks(self) -> Int32: ...
 
-def match_facets(simplices: Int32, n: int) -> tuple[Int32, int]:
-    """Mates (m, d+1), and a corner whose facet is shared by too many simplices or -1."""
+def check_simplices(simplices: Int32, n: int, threads: int) -> tuple[int, int]:
+    """The first row with a number outside 0 .. n-1, and the first that names a vertex twice; -1: none."""
 
-def orient(simplices: Int32, mates: Int32) -> tuple[Int32, NDArray[np.uint8], bool]:
-    """Component (m,), against (m,) and whether the mesh is orientable."""
-
-def check(points: Float64, simplices: Int32, threads: int) -> tuple[int, float]:
-    """Number of invalid simplices and the smallest signed measure."""
+def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
+    """Rows of the inverted simplices, and the smallest signed measure."""
 
 def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
     """Signed measure and validity, each (m,)."""
@@ -48,8 +79,8 @@ def angles(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, Fl
 def relocate(
     move: int,
     points: Float64,
-    movable: NDArray[np.bool_],
-    stars: Stars,
+    visited: NDArray[np.bool_],
+    mesh: Connectivity,
     blocks: Int32,
     threshold_sine2: float,
     min_measure: float,
@@ -57,7 +88,7 @@ def relocate(
     max_move: float,
     threads: int,
 ) -> tuple[int, int]:
-    """Relocate, in place, the movable vertices of some blocks of one colour; the numbers visited and moved.
+    """Relocate, in place, the vertices to visit (n,) of some blocks of one colour; the numbers visited and moved.
 
     Smoothing makes no measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """

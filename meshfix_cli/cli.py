@@ -140,12 +140,12 @@ class _Held:
     fix: str | None
     regions: str | None
 
-    def read(self, source: str, *, double: bool = False, fix_orientation: bool = False) -> Document:
+    def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
         from meshfix_cli.meshfile import read
 
         if source == "-" and sys.stdin.isatty():
             raise click.UsageError("there is no INPUT, and stdin is a terminal")
-        return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation)
+        return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation, threads=threads)
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ class _Files:
     backup: bool
     dry_run: bool
 
-    def open(self, held: _Held, *others: str | None) -> tuple[Document, Format]:
+    def open(self, held: _Held, threads: int, *others: str | None) -> tuple[Document, Format]:
         """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
         from meshfix_cli.meshfile import check_target, output_format
 
@@ -169,7 +169,7 @@ class _Files:
             _check_other(other, self.source, self.target, *named[:i])
         if not self.dry_run:
             check_target(self.target)
-        document = held.read(self.source, double=self.double, fix_orientation=self.fix_orientation)
+        document = held.read(self.source, threads, double=self.double, fix_orientation=self.fix_orientation)
         output = output_format(document, self.target, self.form)
         if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
             lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
@@ -362,7 +362,7 @@ def untangle(
     from meshfix_cli.report import console, history_csv, with_progress
     from meshfix_cli.untangle import collect, plan, steps
 
-    document, output = files.open(held, history, cells)
+    document, output = files.open(held, show.threads, history, cells)
     if cells is not None:
         check_cells(document, cells)
     reach = math.inf if max_move is None else max_move.length(document.mesh)
@@ -417,7 +417,7 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
     """
     from meshfix_cli.perturb import perturb as tangle
 
-    document, output = files.open(held)
+    document, output = files.open(held, show.threads)
     length = dist.length(document.mesh)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
     result, notes = files.write(document, perturbed, output)
@@ -451,7 +451,7 @@ def quality(
     codes = set()
     for source in sources:
         try:
-            document = held.read(source)
+            document = held.read(source, show.threads)
             if cells is not None:
                 _check_other(cells, source)
                 _write_cells(document, document.mesh, cells, show.threads)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import _kernels
-from meshfix_cli.mesh import Mesh
 
 Array = NDArray[np.float64]
 
@@ -34,7 +33,9 @@ class Reach:
     distance: float = math.inf
 
 
-def minimisations(mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: int) -> Iterator[Array]:
+def minimisations(
+    points: Array, mesh: _kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int
+) -> Iterator[Array]:
     """Yield the points (n, d) after each minimisation over the free vertices, until the targets are used up.
 
     A minimisation ends early where all simplices of the region are valid. A uniform target suits uniform meshes; the
@@ -42,7 +43,9 @@ def minimisations(mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: in
 
     Parameters
     ----------
-    mesh : Mesh
+    points : (n, d) float64
+    mesh : Connectivity
+        With its stars.
     free : (n,) bool
         The vertices that move; the region is their stars.
     reach : Reach
@@ -53,34 +56,34 @@ def minimisations(mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: in
     if not (free.any() and reach.distance > 0):
         return
     region = _Region(mesh, free, reach, threads)
-    yield from region.minimise(mesh.points, region.uniform(mesh.points))
-    embedded = _embedding(mesh, free)
+    yield from region.minimise(points, region.uniform(points))
+    embedded = _embedding(points, mesh, free)
     sizes = region.sizes(embedded)
-    yield from region.minimise(mesh.points, sizes)
+    yield from region.minimise(points, sizes)
     if reach.distance == math.inf:
         yield from region.minimise(embedded, sizes)
 
 
-def _embedding(mesh: Mesh, free: NDArray[np.bool_]) -> Array:
+def _embedding(start: Array, mesh: _kernels.Connectivity, free: NDArray[np.bool_]) -> Array:
     """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation (n, d)."""
     from scipy.sparse import csr_matrix, identity
     from scipy.sparse.linalg import cg
 
-    stars, points, inner = mesh.topology.stars, mesh.points.copy(), np.flatnonzero(free)
-    counts = np.diff(stars.neighbour_offsets)
+    points, inner = start.copy(), np.flatnonzero(free)
+    counts = np.diff(mesh.neighbour_offsets)
     rows = np.repeat(np.arange(len(free)), counts)
     kept = free[rows]
     number = np.cumsum(free) - 1
-    start, end = number[rows[kept]], stars.neighbours[kept]
+    begin, end = number[rows[kept]], mesh.neighbours[kept]
     inside = free[end]
-    pairs = (start[inside], number[end[inside]])
+    pairs = (begin[inside], number[end[inside]])
     # Divided by sqrt(number of neighbours) on both sides, so that the diagonal is one and the matrix symmetric.
     scale = 1 / np.sqrt(counts[inner])
     weights = scale[pairs[0]] * scale[pairs[1]]
     operator = identity(len(inner), format="csr") - csr_matrix((weights, pairs), (len(inner), len(inner)))
     middle = points[inner].mean(axis=0)
-    for k in range(mesh.dimension):
-        held = np.bincount(start[~inside], weights=points[end[~inside], k] - middle[k], minlength=len(inner))
+    for k in range(points.shape[1]):
+        held = np.bincount(begin[~inside], weights=points[end[~inside], k] - middle[k], minlength=len(inner))
         solution, _ = cg(operator, scale * held, maxiter=1000)
         points[inner, k] = middle[k] + scale * solution
     return points
@@ -89,10 +92,12 @@ def _embedding(mesh: Mesh, free: NDArray[np.bool_]) -> Array:
 class _Region:
     """The stars of the free vertices in coordinates of their own: the unit is the mean target size."""
 
-    def __init__(self, mesh: Mesh, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
-        simplices = mesh.topology.simplices[free[mesh.topology.simplices].any(axis=1)]
+    def __init__(self, mesh: _kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
+        simplices = mesh.simplices[free[mesh.simplices].any(axis=1)]
+        rim = np.zeros(len(free), dtype=bool)
+        rim[simplices] = True
         self.moving = np.flatnonzero(free)
-        self.vertices = np.concatenate([self.moving, np.flatnonzero(mesh.topology.mark(simplices) & ~free)])
+        self.vertices = np.concatenate([self.moving, np.flatnonzero(rim & ~free)])
         number = np.full(len(free), -1, dtype=np.int32)
         number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
         self.global_simplices = np.ascontiguousarray(simplices)
@@ -114,7 +119,7 @@ class _Region:
 
     def valid(self, points: Array) -> bool:
         """Whether all simplices of the region are."""
-        return _kernels.check(points, self.global_simplices, self.threads)[0] == 0
+        return len(_kernels.check(points, self.global_simplices, self.threads)[0]) == 0
 
     def minimise(self, start: Array, sizes: Array) -> Iterator[Array]:
         """Yield the points after each minimisation; eps falls by the paper's rule in between."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 from typing import Any, TypeVar
 
 import numpy as np
@@ -29,54 +28,71 @@ class Topology:
 
     Attributes
     ----------
-    simplices : (m, d+1) int32
-        Vertices of each simplex, positively oriented.
     n : int
         Number of points.
     source : (m,) int64
         The row of the user's array behind each simplex (repeated simplices are left out).
     flipped : (m,) bool
         True where the user's numbering has the other orientation.
-    component : (m,) int32
-        Simplices joined through facets have the same number.
-    mates : (m, d+1) int32
-        The corner across the facet opposite each corner, -1 on the boundary; corner = simplex * (d+1) + position.
+    connectivity : _kernels.Connectivity
+        The same in the order in which the kernels work, which is near in memory where it is near in space:
+        `vertices` (k,) and `rows` (m,) are the numbers that its vertices and simplices have here.
     """
 
-    simplices: NDArray[np.int32]
     n: int
     source: NDArray[np.int64]
     flipped: NDArray[np.bool_]
-    component: NDArray[np.int32]
-    mates: NDArray[np.int32]
+    connectivity: _kernels.Connectivity
 
     @property
     def dimension(self) -> int:
         """2 for triangles, 3 for tetrahedra."""
-        return self.simplices.shape[1] - 1
+        return self.connectivity.simplices.shape[1] - 1
 
-    @cached_property
-    def stars(self) -> _kernels.Stars:
-        """Incidence, neighbours, blocks and block colours."""
+    def stars(self, threads: int = 1) -> _kernels.Connectivity:
+        """Return the connectivity with neighbours, faces and colours of blocks, made when they are first needed."""
         try:
-            return _kernels.Stars(self.simplices, self.n)
+            self.connectivity.build_stars(threads)
         except ValueError as error:  # a star, or the mesh, is too large to be numbered
             raise InvalidMeshError(str(error)) from error
+        return self.connectivity
 
     @cached_property
     def colours(self) -> list[NDArray[np.int32]]:
         """The blocks of each colour; no two blocks of one colour share an edge."""
-        return np.split(self.stars.colour_blocks, self.stars.colour_offsets[1:-1])
+        stars = self.stars()
+        return np.split(stars.colour_blocks, stars.colour_offsets[1:-1])
+
+    @cached_property
+    def simplices(self) -> NDArray[np.int32]:
+        """(m, d+1) int32: the vertices of each simplex, positively oriented."""
+        mesh = self.connectivity
+        return _read_only(self.of_rows(mesh.vertices[mesh.simplices]))
+
+    @cached_property
+    def component(self) -> NDArray[np.int32]:
+        """(m,) int32: simplices joined through facets have the same number."""
+        return _read_only(self.of_rows(self.connectivity.component))
+
+    @cached_property
+    def mates(self) -> NDArray[np.int32]:
+        """(m, d+1) int32: the corner across the facet opposite each corner, -1 on the boundary.
+
+        A corner is simplex * (d+1) + position.
+        """
+        mesh, corners = self.connectivity, self.dimension + 1
+        across = mesh.rows[mesh.mates // corners] * corners + mesh.mates % corners
+        return _read_only(self.of_rows(np.where(mesh.mates < 0, -1, across)))
 
     @cached_property
     def used(self) -> NDArray[np.bool_]:
         """(n,) bool: the vertices of simplices; other points are isolated."""
-        return self.mark(self.simplices)
+        return self.of_vertices(np.ones(len(self.connectivity.vertices), dtype=bool))
 
     @cached_property
     def boundary(self) -> NDArray[np.bool_]:
         """(n,) bool: vertices of facets that belong to one simplex."""
-        return self._mark_facets(self.mates < 0)
+        return self._mark_facets(self.connectivity.mates < 0)
 
     @cached_property
     def mirrored(self) -> NDArray[np.bool_]:
@@ -84,48 +100,53 @@ class Topology:
 
         Components without an inner vertex have that of the whole mesh.
         """
+        if not self.flipped.any():
+            return np.zeros(len(self.flipped), dtype=bool)
         votes = np.bincount(self.component, weights=self.flipped * 2.0 - 1.0)
         inner = (self.used & ~self.boundary)[self.simplices].any(axis=1)
         # Without an inner vertex a part is its boundary: that may be tangled as well as mirrored, so all parts vote.
         by_itself = np.bincount(self.component, weights=inner) > 0
         return np.where(by_itself, votes > 0, votes.sum() > 0)[self.component]
 
-    @property
+    @cached_property
     def misnumbered(self) -> NDArray[np.bool_]:
         """(m,) bool: simplices numbered against most of their component: inverted for whoever reads the file."""
         return self.flipped != self.mirrored
 
     def interface(self, regions: ArrayLike) -> NDArray[np.bool_]:
         """(n,) bool: vertices of facets between simplices of different regions; `regions` (m,) labels."""
-        labels = np.asarray(regions)
-        across = labels[self.mates // (self.dimension + 1)]
-        return self._mark_facets((self.mates >= 0) & (across != labels[:, None]))
+        mesh = self.connectivity
+        labels = np.asarray(regions)[mesh.rows]
+        across = labels[mesh.mates // (self.dimension + 1)]
+        return self._mark_facets((mesh.mates >= 0) & (across != labels[:, None]))
 
     def grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
         """(n,) bool: these vertices and `rings` rings of neighbours around them."""
-        grown = vertices.copy()
-        for _ in range(rings):
-            grown[self.simplices[grown[self.simplices].any(axis=1)]] = True
-        return grown
+        return vertices | self.of_vertices(
+            self.connectivity.grown(vertices[self.connectivity.vertices], rings).view(bool)
+        )
 
-    def facet_pairs(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-        """Return the two simplices at each interior facet."""
-        corner = np.flatnonzero(self.mates.ravel() > np.arange(self.mates.size))
-        mate = self.mates.ravel()[corner]
-        return (corner // (self.dimension + 1)).astype(np.int32), mate // np.int32(self.dimension + 1)
+    def of_vertices(self, values: NDArray[_T]) -> NDArray[_T]:
+        """Return values (k, ...) of the connectivity's vertices as those of all points (n, ...); 0: isolated."""
+        result = np.zeros((self.n, *values.shape[1:]), dtype=values.dtype)
+        result[self.connectivity.vertices] = values
+        return result
 
-    def mark(self, vertices: NDArray[np.int32]) -> NDArray[np.bool_]:
-        """(n,) bool: these vertices."""
-        mask = np.zeros(self.n, dtype=bool)
-        mask[vertices] = True
-        return mask
+    def of_rows(self, values: NDArray[_T]) -> NDArray[_T]:
+        """Return values (m, ...) of the connectivity's simplices in the order of the simplices."""
+        result = np.empty_like(values)
+        result[self.connectivity.rows] = values
+        return result
 
     def _mark_facets(self, facets: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        mask = np.zeros(self.n, dtype=bool)
-        for position in range(self.dimension + 1):
-            others = np.delete(self.simplices, position, axis=1)
-            mask[others[facets[:, position]]] = True
-        return mask
+        mesh, corners = self.connectivity, self.dimension + 1
+        mask = np.zeros(len(mesh.vertices), dtype=bool)
+        for position in range(corners):
+            rows = np.flatnonzero(facets[:, position])
+            for other in range(corners):
+                if other != position:
+                    mask[mesh.simplices[rows, other]] = True
+        return self.of_vertices(mask)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +167,7 @@ class Mesh:
     movable: NDArray[np.bool_]
 
     @classmethod
-    def build(cls, points: ArrayLike, simplices: ArrayLike, fixed: ArrayLike | None = None) -> Mesh:
+    def build(cls, points: ArrayLike, simplices: ArrayLike, fixed: ArrayLike | None = None, threads: int = 1) -> Mesh:
         """Check the arrays, orient the simplices and fix the boundary.
 
         Parameters
@@ -157,6 +178,7 @@ class Mesh:
             Numbered either way round; see `Topology.flipped`.
         fixed : (n,) bool, optional
             Vertices that must not move, beside those of the boundary.
+        threads : int
 
         Raises
         ------
@@ -165,9 +187,9 @@ class Mesh:
             a simplex that names a vertex twice, a facet of more than two simplices, a Moebius band.
         """
         p = np.array(points, dtype=np.float64, order="C")
-        rows = _checked_simplices(p, np.asarray(simplices))
+        rows = _checked_simplices(p, np.asarray(simplices), threads)
         _check_coordinates(p, rows)
-        topology = _build_topology(p, rows)
+        topology = _build_topology(p, rows, threads)
         movable = topology.used & ~topology.boundary
         if fixed is not None:
             movable &= ~np.asarray(fixed, dtype=bool)
@@ -188,16 +210,27 @@ class Mesh:
         """Return the same mesh with more vertices fixed, `fixed` (n,) bool."""
         return replace(self, movable=_read_only(self.movable & ~fixed))
 
+    def along_curve(self, values: NDArray[_T]) -> NDArray[_T]:
+        """Return values (n, ...) of the points as those (k, ...) of the connectivity's vertices."""
+        return values[self.topology.connectivity.vertices]
+
     def check(self, threads: int = 1) -> tuple[int, float]:
         """Return the number of inverted simplices and the smallest signed area or volume, in model units."""
-        return _kernels.check(self.points, self.topology.simplices, threads)
+        points, simplices = self.along_curve(self.points), self.topology.connectivity.simplices
+        inverted, smallest = _kernels.check(points, simplices, threads)
+        return len(inverted), smallest
+
+    def stuck(self) -> NDArray[np.int32]:
+        """Return the rows of the connectivity's simplices that have no free vertex."""
+        free = self.along_curve(self.movable)[self.topology.connectivity.simplices]
+        return np.flatnonzero(~free.any(axis=1)).astype(np.int32)
 
     def mean_edge_length(self) -> float:
         """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
-        stars = self.topology.stars
-        start = np.repeat(np.arange(self.topology.n, dtype=np.int32), np.diff(stars.neighbour_offsets))
+        stars, points = self.topology.stars(), self.along_curve(self.points)
+        start = np.repeat(np.arange(len(points), dtype=np.int32), np.diff(stars.neighbour_offsets))
         once = start < stars.neighbours
-        edges = self.points[stars.neighbours[once]] - self.points[start[once]]
+        edges = points[stars.neighbours[once]] - points[start[once]]
         return float(np.linalg.norm(edges, axis=1).mean())
 
 
@@ -206,7 +239,9 @@ def _read_only(array: NDArray[_T]) -> NDArray[_T]:
     return array
 
 
-def _checked_simplices(points: NDArray[np.float64], simplices: NDArray[np.integer[Any]]) -> NDArray[np.int32]:
+def _checked_simplices(
+    points: NDArray[np.float64], simplices: NDArray[np.integer[Any]], threads: int
+) -> NDArray[np.int32]:
     """Check shapes and indices; return the simplices as (m, d+1) int32."""
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InvalidMeshError(f"points have the shape {points.shape}; (n, 2) or (n, 3) is needed")
@@ -217,16 +252,16 @@ def _checked_simplices(points: NDArray[np.float64], simplices: NDArray[np.intege
         raise InvalidMeshError("the mesh has no elements")
     if simplices.size >= 2**31 or n >= 2**31:
         raise InvalidMeshError("the mesh is too large: 536 million tetrahedra are the limit")
-    outside = ((simplices < 0) | (simplices >= n)).any(axis=1)
-    if outside.any():
-        row = int(np.argmax(outside))
-        raise InvalidMeshError(f"element {row} refers to vertices {simplices[row].tolist()}, but there are {n} points")
-    for i, j in combinations(range(d + 1), 2):
-        repeated = simplices[:, i] == simplices[:, j]
-        if repeated.any():
-            row = int(np.argmax(repeated))
-            raise InvalidMeshError(f"element {row} names a vertex twice: {simplices[row].tolist()}")
-    return np.array(simplices, dtype=np.int32, order="C")
+    # What does not fit in 32 bits is outside as well.
+    small = simplices if simplices.dtype.itemsize <= 4 else np.clip(simplices, -1, n)
+    rows = np.ascontiguousarray(small, dtype=np.int32)
+    outside, repeated = _kernels.check_simplices(rows, n, threads)
+    if outside >= 0:
+        named = simplices[outside].tolist()
+        raise InvalidMeshError(f"element {outside} refers to vertices {named}, but there are {n} points")
+    if repeated >= 0:
+        raise InvalidMeshError(f"element {repeated} names a vertex twice: {simplices[repeated].tolist()}")
+    return rows
 
 
 def _check_coordinates(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> None:
@@ -243,32 +278,27 @@ def _check_coordinates(points: NDArray[np.float64], simplices: NDArray[np.int32]
         raise InvalidMeshError("all vertices are in one point")
 
 
-def _build_topology(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> Topology:
+def _build_topology(points: NDArray[np.float64], simplices: NDArray[np.int32], threads: int) -> Topology:
     n, d = points.shape
     source = np.arange(len(simplices))
-    mates, crowded = _kernels.match_facets(simplices, n)
-    if crowded >= 0:
+    mesh = _kernels.Connectivity(points, simplices, threads)
+    if mesh.crowded >= 0:
         _, first = np.unique(np.sort(simplices, axis=1), axis=0, return_index=True)
         source = np.sort(first)
-        simplices = np.ascontiguousarray(simplices[source])
-        mates, crowded = _kernels.match_facets(simplices, n)
-    if crowded >= 0:
-        facet = np.delete(simplices[crowded // (d + 1)], crowded % (d + 1)).tolist()
+        mesh = _kernels.Connectivity(points, np.ascontiguousarray(simplices[source]), threads)
+    if mesh.crowded >= 0:
+        row, position = divmod(mesh.crowded, d + 1)
+        facet = np.delete(mesh.vertices[mesh.simplices[row]], position).tolist()
         raise InvalidMeshError(f"more than two {CELL_NAMES[d][1]} share the {FACET_NAMES[d]} {facet}: they overlap")
-    component, against, orientable = _kernels.orient(simplices, mates)
-    if not orientable:
+    if not mesh.orientable:
         raise InvalidMeshError(f"the {CELL_NAMES[d][1]} form a Moebius band: no numbering makes all of them positive")
-    flipped = against.astype(bool)
+    flipped = mesh.against.astype(bool)
     # The signed size of a consistently numbered component depends on its boundary alone, so it tells a mesh that
     # is numbered the other way round from one whose interior is tangled.
-    measure = _kernels.measure(points, simplices, 1)[0] * np.where(flipped, -1.0, 1.0)
-    flipped ^= (np.bincount(component, weights=measure) < 0)[component]
+    measure = _kernels.measure(points[mesh.vertices], mesh.simplices, threads)[0] * np.where(flipped, -1.0, 1.0)
+    flipped ^= (np.bincount(mesh.component, weights=measure) < 0)[mesh.component]
     if flipped.any():
-        simplices = np.where(flipped[:, None], _swapped(simplices), simplices)
-        mates, _ = _kernels.match_facets(simplices, n)
-    return Topology(simplices, n, source, flipped, component, mates)
-
-
-def _swapped(rows: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Swap the first two columns: the other orientation."""
-    return np.concatenate([rows[:, 1::-1], rows[:, 2:]], axis=1)
+        mesh.flip(flipped, threads)
+    rows = np.empty_like(flipped)
+    rows[mesh.rows] = flipped
+    return Topology(n, source, rows, mesh)

@@ -17,15 +17,15 @@ class Obstacles:
 
     Attributes
     ----------
-    inverted : (k,) int64
+    inverted : (k,) int32
         Inverted simplices without a free vertex.
-    crossing : (c, 2) int64
+    crossing : (c, 2) int32
         Pairs of simplices of one part that have fixed facets which cross each other: the part overlaps itself, even
         where all of its simplices are positive. Each facet's first 16 crossings are looked for.
     """
 
-    inverted: NDArray[np.int64]
-    crossing: NDArray[np.int64]
+    inverted: NDArray[np.int32]
+    crossing: NDArray[np.int32]
 
     def __bool__(self) -> bool:
         return len(self.inverted) + len(self.crossing) > 0
@@ -36,26 +36,11 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
 
     Facets that only touch, as at a slit, do not cross; nor do those of separate parts, which may be in contact.
     """
-    topology = mesh.topology
-    fixed = ~mesh.movable[topology.simplices]
-    rows = np.flatnonzero(fixed.all(axis=1))
-    valid = _kernels.measure(mesh.points, np.ascontiguousarray(topology.simplices[rows]), threads)[1]
-    facets, owners = _fixed_facets(mesh, fixed)
-    pairs = owners[_kernels.crossings(mesh.points, facets, threads)]
-    pairs = np.unique(np.sort(pairs, axis=1), axis=0)
-    return Obstacles(rows[valid == 0], pairs[topology.component[pairs[:, 0]] == topology.component[pairs[:, 1]]])
-
-
-def _fixed_facets(mesh: Mesh, fixed: NDArray[np.bool_]) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Return the facets (f, d) all of whose vertices are fixed, each once, and a simplex of each."""
-    simplices, mates = mesh.topology.simplices, mesh.topology.mates
-    corners = simplices.shape[1]
-    first = mates < np.arange(simplices.size).reshape(simplices.shape)
-    some = np.flatnonzero(fixed.sum(axis=1) >= corners - 1)
-    facets, owners = [], []
-    for position in range(corners):
-        rest = [k for k in range(corners) if k != position]
-        rows = some[fixed[some][:, rest].all(axis=1) & first[some, position]]
-        facets.append(simplices[rows][:, rest])
-        owners.append(rows)
-    return np.ascontiguousarray(np.concatenate(facets)), np.concatenate(owners)
+    connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
+    rows = mesh.stuck()
+    inverted, _ = _kernels.check(points, connectivity.simplices[rows], threads)
+    facets, owners = connectivity.fixed_facets(mesh.along_curve(mesh.movable), threads)
+    pairs = owners[_kernels.crossings(points, facets, threads)]
+    pairs = pairs[connectivity.component[pairs[:, 0]] == connectivity.component[pairs[:, 1]]]
+    named = np.sort(connectivity.rows[pairs], axis=1)
+    return Obstacles(np.sort(connectivity.rows[rows[inverted]]), np.unique(named, axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 from collections.abc import Callable, Sequence
@@ -60,7 +61,7 @@ class Summary:
     percentile_1: float
     histogram: tuple[int, ...]
     metrics: dict[str, tuple[float, float]]
-    inverted_elements: NDArray[np.int64]
+    inverted_elements: NDArray[np.int32]
 
 
 # What a requirement can name beside the metrics: what the report prints of a mesh.
@@ -83,25 +84,22 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summ
         `folded` counts interior facets with both simplices on one side; `percentile_1` is that of the elements'
         smallest angles; `histogram` counts those in bins of `BIN_WIDTH` degrees.
     """
-    measure, valid = _kernels.measure(mesh.points, mesh.topology.simplices, threads)
-    smallest, largest = np.degrees(_kernels.angles(mesh.points, mesh.topology.simplices, threads))
-    one, other = mesh.topology.facet_pairs()
-    positive, negative = measure > 0, measure < 0
-    folded = (positive[one] & negative[other]) | (negative[one] & positive[other])
-    inverted_elements = np.flatnonzero(valid == 0)
+    connectivity = mesh.topology.connectivity
+    radians, inverted, folded, min_measure, largest = connectivity.summarise(mesh.along_curve(mesh.points), threads)
+    smallest = np.degrees(radians)
     bins = BINS[mesh.dimension]
     return Summary(
-        elements=len(measure),
-        inverted=len(inverted_elements),
-        folded=int(folded.sum()),
-        min_measure=float(measure.min()),
+        elements=len(smallest),
+        inverted=len(inverted),
+        folded=folded,
+        min_measure=min_measure,
         min_angle=float(smallest.min()),
-        max_angle=float(largest.max()),
+        max_angle=math.degrees(largest),
         mean_min_angle=float(smallest.mean()),
         percentile_1=float(np.percentile(smallest, 1)),
         histogram=tuple(np.histogram(smallest, bins, (0.0, bins * BIN_WIDTH))[0].tolist()),
         metrics={name: _worst_and_mean(name, mesh) for name in metrics},
-        inverted_elements=inverted_elements,
+        inverted_elements=np.sort(connectivity.rows[inverted]),
     )
 
 
@@ -181,10 +179,10 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
 
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     """Return the smallest angle among simplices with no free vertex: no method can raise it. None: there are none."""
-    stuck = mesh.topology.simplices[~mesh.movable[mesh.topology.simplices].any(axis=1)]
+    stuck = mesh.topology.connectivity.simplices[mesh.stuck()]
     if len(stuck) == 0:
         return None
-    return float(np.degrees(_kernels.angles(mesh.points, stuck, threads)[0].min()))
+    return float(np.degrees(_kernels.angles(mesh.along_curve(mesh.points), stuck, threads)[0].min()))
 
 
 def evaluate(name: str, mesh: Mesh) -> Array:

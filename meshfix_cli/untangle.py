@@ -216,12 +216,18 @@ def steps(
 
 def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
     """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-    free = mesh.topology.simplices[mesh.movable[mesh.topology.simplices].any(axis=1)]
-    return bool(_kernels.angles(mesh.points, free, threads)[0].min(initial=math.pi) >= math.radians(degrees))
+    import numpy as np
+
+    free = np.delete(mesh.topology.connectivity.simplices, mesh.stuck(), axis=0)
+    smallest = _kernels.angles(mesh.along_curve(mesh.points), free, threads)[0]
+    return bool(smallest.min(initial=math.pi) >= math.radians(degrees))
 
 
 class _Run:
-    """The mesh between two sweeps, and the best so far by what can be mended: simplices that have a free vertex."""
+    """The positions between two sweeps, and the best so far by what can be mended: simplices that have a free vertex.
+
+    All arrays are in the order of `Topology.connectivity`.
+    """
 
     def __init__(self, mesh: Mesh, threshold_sine2: float, max_move: float, only_invalid: bool, threads: int) -> None:
         import numpy as np
@@ -229,22 +235,39 @@ class _Run:
         from meshfix_cli.foldover import Reach
 
         self.clock = time.perf_counter()
-        self.mesh, self.threshold_sine2, self.threads = mesh, threshold_sine2, threads
-        self.reach = Reach(mesh.points, max_move)
-        simplices = mesh.topology.simplices
-        _ = mesh.topology.stars  # built now, so that its time is not that of the first sweep
-        valid = _kernels.measure(mesh.points, simplices, threads)[1].astype(bool)
-        stuck = ~(valid | mesh.movable[simplices].any(axis=1))
-        self.mendable = np.ascontiguousarray(simplices[~stuck]) if stuck.any() else simplices
-        self.beyond_repair = _kernels.check(mesh.points, np.ascontiguousarray(simplices[stuck]), threads)
-        self.left, self.measure = self._check(mesh.points)
+        self.input, self.threshold_sine2, self.threads = mesh, threshold_sine2, threads
+        self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
+        self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
+        self.reach = Reach(self.points, max_move)
+        stuck = self.stars.simplices[mesh.stuck()]
+        inverted = _kernels.check(self.points, stuck, threads)[0]
+        self.mendable = self.stars.simplices
+        if len(inverted):
+            self.mendable = np.delete(self.mendable, mesh.stuck()[inverted], axis=0)
+        self.beyond_repair = len(inverted), _kernels.check(self.points, stuck[inverted], threads)[1]
+        self.changed = np.zeros(len(self.points), dtype=bool)
+        self._check()
         self.record = self._record("input", 0, 0)
-        self.first = self.best = (mesh, self.record, (self.left, -self.measure))
-        self.fewest, self.largest = self.left, self.measure
-        self.only_invalid, self.changed = only_invalid, np.zeros(mesh.topology.n, dtype=bool)
-        self.near = mesh.movable & self._broken() if only_invalid else mesh.movable
+        self.first = self.best = (self.points, self.record, self._rank())
+        self.fewest, self.largest = self._rank()[0], self.measure
+        self.only_invalid = only_invalid
+        self.near = self.free & self._broken() if only_invalid else self.free
         # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh at these positions."""
+        if self.points is self.first[0]:
+            return self.input
+        points = self.input.points.copy()
+        points[self.stars.vertices] = self.points
+        return self.input.with_points(points)
+
+    @property
+    def left(self) -> int:
+        """How many inverted simplices that can be mended there are."""
+        return len(self.inverted)
 
     def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         """Yield the points after each sweep; the caller adds them before it asks for the next."""
@@ -253,34 +276,39 @@ class _Run:
 
     def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
         """Take the points of a sweep; return whether there was progress."""
-        self.changed = self.mesh.movable & (points != self.mesh.points).any(axis=1)
+        self.changed = (points != self.points).any(axis=1)
         if self.only_invalid and not phase.moves:
             self.near = self.near | self.changed
-        self.mesh = self.mesh.with_points(points)
-        self.left, self.measure = self._check(points)
+        self.points = points
+        self._check()
         sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
         self.record = self._record(phase.name, sweep, int(self.changed.sum()))
-        self.best = min(self.best, (self.mesh, self.record, (self.left, -self.measure)), key=lambda one: one[2])
+        self.best = min(self.best, (self.points, self.record, self._rank()), key=lambda one: one[2])
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
 
     def go_back(self, untangling: bool) -> bool:
-        """Return to the best mesh; False: it is the last.
+        """Return to the best positions; False: they are the last.
 
-        When untangling is over and left as many inverted elements as there were, nothing was mended, and the best is
-        the input: what is well in it was moved for nothing.
+        When untangling is over and left as many inverted elements as there were, nothing was mended, and the best are
+        those of the input: what is well in it was moved for nothing.
         """
         mended = self.best[2][0] < self.first[2][0]
-        mesh, record, rank = self.best if untangling or mended else self.first
-        if mesh is self.mesh:
+        points, record, _ = self.best if untangling or mended else self.first
+        if points is self.points:
             return False
-        self.mesh, (self.left, self.measure) = mesh, (rank[0], -rank[1])
+        self.points = points
+        self._check()
         self.record = replace(record, phase="best", moved=0, seconds=0.0)
         return True
 
-    def _check(self, points: NDArray[np.float64]) -> tuple[int, float]:
-        return _kernels.check(points, self.mendable, self.threads)
+    def _check(self) -> None:
+        """Find the inverted simplices, as rows of `mendable`, and the smallest measure."""
+        self.inverted, self.measure = _kernels.check(self.points, self.mendable, self.threads)
+
+    def _rank(self) -> tuple[int, float]:
+        return self.left, -self.measure
 
     def _record(self, phase: str, sweep: int, moved: int) -> SweepRecord:
         inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
@@ -288,34 +316,42 @@ class _Run:
 
     def _broken(self) -> NDArray[np.bool_]:
         """(n,) bool: the vertices of inverted simplices that can be mended."""
-        valid = _kernels.measure(self.mesh.points, self.mendable, self.threads)[1]
-        return self.mesh.topology.mark(self.mendable[valid == 0])
+        mask = self.changed & False
+        mask[self.mendable[self.inverted]] = True
+        return mask
+
+    def _grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
+        """(n,) bool: free vertices among these and `rings` rings of neighbours around them."""
+        return self.free & self.stars.grown(vertices, rings).view(bool)
 
     def _relocations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        stars, colours, near = self.mesh.topology.stars, self.mesh.topology.colours, self.near
+        near = self.near
         if self.only_invalid and phase.until == "settled":
-            near = self.mesh.movable & self.mesh.topology.grown(near, NEAR)
+            near = self._grown(near, NEAR)
+        visited = near
         for move in cycle(phase.moves):
-            visited = near
             if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
-                visited = visited & (self._broken() | self.mesh.topology.grown(self.changed, 1))
-            points = self.mesh.points.copy()
-            for blocks in colours:
+                visited = near & (self._broken() | self._grown(self.changed, 1))
+            points = self.points.copy()
+            for blocks in self.colours:
                 _kernels.relocate(
-                    move, points, visited, stars, blocks, self.threshold_sine2, self.min_measure,
+                    move, points, visited, self.stars, blocks, self.threshold_sine2, self.min_measure,
                     self.reach.start, self.reach.distance, self.threads,
                 )  # fmt: skip
             yield points
+            visited = near
+            if len(phase.moves) == 1:  # elsewhere a second visit finds what the first did
+                visited = near & self._grown(self.changed, 1)
 
     def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         from meshfix_cli.foldover import minimisations
 
-        mesh, broken = self.mesh, self._broken()
+        broken = self._broken()
         for rings in phase.rings:
-            free = mesh.movable if rings is None else mesh.movable & mesh.topology.grown(broken, rings)
-            if rings is not None and 2 * free.sum() > mesh.movable.sum():
+            free = self.free if rings is None else self._grown(broken, rings)
+            if rings is not None and 2 * free.sum() > self.free.sum():
                 return  # as good as the whole mesh
-            yield from minimisations(mesh, free, self.reach, self.threads)
+            yield from minimisations(self.points, self.stars, free, self.reach, self.threads)
 
 
 def collect(run: Iterator[tuple[Mesh, SweepRecord]], threads: int = 1) -> Outcome:

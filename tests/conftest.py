@@ -46,14 +46,21 @@ def tangle(mesh: Mesh, percent: float = 25, distance: float = 2, seed: int = 0) 
     return perturb(mesh, percent, distance * mesh.mean_edge_length(), seed)[0]
 
 
+def star_rows(mesh: Mesh, vertex: int) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.int32]]:
+    """Neighbours (k,), faces (n, d) as positions among them, and simplices (n,) of a vertex."""
+    stars, d = mesh.topology.stars(), mesh.dimension
+    here = int(np.flatnonzero(stars.vertices == vertex)[0])
+    first, last = stars.offsets[here], stars.offsets[here + 1]
+    row = stars.neighbours[stars.neighbour_offsets[here] : stars.neighbour_offsets[here + 1]]
+    faces = np.ascontiguousarray(stars.faces.reshape(-1, d)[first:last])
+    return stars.vertices[row], faces, stars.rows[stars.corners[first:last] // (d + 1)]
+
+
 def star_of(mesh: Mesh, vertex: int) -> tuple[NDArray[np.float64], NDArray[np.uint16]]:
     """Neighbours (k, d) around the origin and faces (n, d) of a vertex, as the kernels take them."""
-    stars = mesh.topology.stars
-    row = stars.neighbours[stars.neighbour_offsets[vertex] : stars.neighbour_offsets[vertex + 1]]
-    first, last = stars.offsets[vertex], stars.offsets[vertex + 1]
-    faces = stars.faces.reshape(-1, mesh.dimension)[first:last]
+    row, faces, _ = star_rows(mesh, vertex)
     points = mesh.points[row] - mesh.points[row].mean(axis=0)
-    return points / np.abs(points).max(), np.ascontiguousarray(faces)
+    return points / np.abs(points).max(), faces
 
 
 def random_star(

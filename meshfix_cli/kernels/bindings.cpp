@@ -57,16 +57,35 @@ auto with_dimension(std::size_t d, const F& f) {
     return d == 2 ? f(std::integral_constant<int, 2>{}) : f(std::integral_constant<int, 3>{});
 }
 
-struct PyStars {
+struct PyConnectivity {
     int dimension;
-    Stars stars;
+    Connectivity mesh;
 };
 
 template <auto Member>
-auto view(PyStars& self) {
-    auto& values = self.stars.*Member;
+auto view(PyConnectivity& self) {
+    auto& values = self.mesh.*Member;
     using T = typename std::remove_reference_t<decltype(values)>::value_type;
     return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+}
+
+template <auto Member>
+auto rows_view(PyConnectivity& self) {
+    auto& values = self.mesh.*Member;
+    using T = typename std::remove_reference_t<decltype(values)>::value_type;
+    const std::size_t columns = static_cast<std::size_t>(self.dimension) + 1;
+    return Matrix<const T>(values.data(), {values.size() / columns, columns}, nb::find(self));
+}
+
+const std::uint8_t* bytes_of(const Vector<const bool>& mask, std::int64_t expected) {
+    if (static_cast<std::int64_t>(mask.shape(0)) != expected) throw nb::value_error("the mask is of another mesh");
+    return reinterpret_cast<const std::uint8_t*>(mask.data());
+}
+
+template <class T>
+void check_points(const Matrix<T>& points, const PyConnectivity& self) {
+    if (static_cast<int>(points.shape(1)) != self.dimension || static_cast<std::int64_t>(points.shape(0)) != self.mesh.n())
+        throw nb::value_error("the points are of another mesh");
 }
 
 // A star given by itself, in its local frame.
@@ -84,52 +103,100 @@ Star<D> make_star(const Matrix<const double>& neighbours, const Matrix<const std
     return star;
 }
 
-auto match_facets_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
-    const std::size_t corners = simplices.shape(1);
-    Facets facets = with_dimension(corners - 1, [&](auto d) {
-        return match_facets<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n);
+void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
+                       const Matrix<const std::int32_t>& simplices, int threads) {
+    if (simplices.shape(1) != points.shape(1) + 1) throw nb::value_error("the simplices are of another dimension");
+    Connectivity mesh = with_dimension(points.shape(1), [&](auto d) {
+        return connect<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
+                          static_cast<std::int64_t>(simplices.shape(0)), threads);
     });
-    return std::make_pair(to_numpy(std::move(facets.mates), corners), facets.crowded);
+    new (self) PyConnectivity{static_cast<int>(points.shape(1)), std::move(mesh)};
 }
 
-auto orient_py(const Matrix<const std::int32_t>& simplices, const Matrix<const std::int32_t>& mates) {
-    Orientation result = with_dimension(simplices.shape(1) - 1, [&](auto d) {
-        return orient<d>(simplices.data(), mates.data(), static_cast<std::int64_t>(simplices.shape(0)));
-    });
-    return std::make_tuple(to_numpy(std::move(result.component)), to_numpy(std::move(result.against)),
-                           result.orientable);
+void flip_py(PyConnectivity& self, const Vector<const bool>& flipped, int threads) {
+    const std::uint8_t* mask = bytes_of(flipped, self.mesh.m());
+    with_dimension(self.dimension, [&](auto d) { flip<d>(self.mesh, mask, threads); });
 }
 
-void init_stars(PyStars* self, const Matrix<const std::int32_t>& simplices, std::int64_t n) {
-    const int dimension = static_cast<int>(simplices.shape(1)) - 1;
-    Stars stars = with_dimension(simplices.shape(1) - 1, [&](auto d) {
-        return build_stars<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n);
-    });
-    new (self) PyStars{dimension, std::move(stars)};
+void build_stars_py(PyConnectivity& self, int threads) {
+    with_dimension(self.dimension, [&](auto d) { build_stars<d>(self.mesh, threads); });
 }
 
-auto relocate_py(int move, const Matrix<double>& points, const Vector<const bool>& movable, const PyStars& stars,
+auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int rings) {
+    const std::uint8_t* bytes = bytes_of(mask, self.mesh.n());
+    std::vector<std::uint8_t> marked(bytes, bytes + self.mesh.n());
+    with_dimension(self.dimension, [&](auto d) {
+        for (int ring = 0; ring < rings; ++ring) grow<d>(self.mesh, marked);
+    });
+    return to_numpy(std::move(marked));
+}
+
+auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
+    const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
+    FixedFacets found = with_dimension(self.dimension, [&](auto d) {
+        return fixed_facets<d>(self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), mask, threads);
+    });
+    return std::make_pair(to_numpy(std::move(found.vertices), static_cast<std::size_t>(self.dimension)),
+                          to_numpy(std::move(found.owners)));
+}
+
+auto summarise_py(const PyConnectivity& self, const Matrix<const double>& points, int threads) {
+    check_points(points, self);
+    Summary total = with_dimension(self.dimension, [&](auto d) {
+        return summarise<d>(points.data(), self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), threads);
+    });
+    return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.inverted)), total.folded,
+                           total.min_measure, total.largest);
+}
+
+auto check_simplices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
+    const auto m = static_cast<std::int64_t>(simplices.shape(0));
+    const auto columns = static_cast<std::int64_t>(simplices.shape(1));
+    struct Bad {
+        std::int64_t outside = -1, repeated = -1;
+    };
+    std::vector<Bad> parts(m / PER_ITEM + 1);
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t s = end; s-- > begin;) {
+            const std::int32_t* row = simplices.data() + s * columns;
+            for (std::int64_t i = 0; i < columns; ++i) {
+                if (row[i] < 0 || row[i] >= n) parts[item].outside = s;
+                for (std::int64_t j = 0; j < i; ++j)
+                    if (row[i] == row[j]) parts[item].repeated = s;
+            }
+        }
+    });
+    Bad first;
+    for (const auto& part : parts) {
+        if (first.outside < 0) first.outside = part.outside;
+        if (first.repeated < 0) first.repeated = part.repeated;
+    }
+    return std::make_pair(first.outside, first.repeated);
+}
+
+auto relocate_py(int move, const Matrix<double>& points, const Vector<const bool>& visited, const PyConnectivity& self,
                  const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
                  const Matrix<const double>& start, double max_move, int threads) {
-    const Stars& s = stars.stars;
-    if (static_cast<int>(points.shape(1)) != stars.dimension || points.shape(0) + 1 != s.offsets.size() ||
-        movable.shape(0) != points.shape(0) || start.shape(0) != points.shape(0) || start.shape(1) != points.shape(1))
-        throw nb::value_error("points, movable and stars are not of the same mesh");
+    const Connectivity& mesh = self.mesh;
+    if (mesh.colour_offsets.empty()) throw nb::value_error("the stars are not built");
+    check_points(points, self);
+    check_points(start, self);
+    const std::uint8_t* mask = bytes_of(visited, mesh.n());
     const Counts counts = with_dimension(points.shape(1), [&](auto d) {
-        const StarsView view{s.offsets.data(), s.faces.data(), s.neighbour_offsets.data(), s.neighbours.data()};
-        return relocate<d>(static_cast<Move>(move), view, points.data(),
-                           reinterpret_cast<const std::uint8_t*>(movable.data()), s.block_offsets.data(),
-                           s.block_vertices.data(), blocks.data(), static_cast<std::int64_t>(blocks.shape(0)),
+        const StarsView view{mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(),
+                             mesh.neighbours.data()};
+        return relocate<d>(static_cast<Move>(move), view, points.data(), mask, mesh.n(), blocks.data(),
+                           static_cast<std::int64_t>(blocks.shape(0)),
                            Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
     });
     return std::make_pair(counts.visited, counts.moved);
 }
 
 auto check_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
-    const Validity total = with_dimension(points.shape(1), [&](auto d) {
+    Validity total = with_dimension(points.shape(1), [&](auto d) {
         return check<d>(points.data(), simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), threads);
     });
-    return std::make_pair(total.inverted, total.min_measure);
+    return std::make_pair(to_numpy(std::move(total.inverted)), total.min_measure);
 }
 
 auto measure_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
@@ -155,9 +222,9 @@ auto angles_py(const Matrix<const double>& points, const Matrix<const std::int32
         constexpr int D = dimension;
         for_each_simplex<D>(points.data(), simplices.data(), static_cast<std::int64_t>(m), threads,
                             [&](std::int64_t s, const Edges<D>& e) {
-                                const AngleRange range = angles(e);
-                                smallest[s] = range.smallest;
-                                largest[s] = range.largest;
+                                const ExtremeAngles extreme = angles(e);
+                                smallest[s] = extreme.smallest();
+                                largest[s] = extreme.largest();
                             });
     });
     return std::make_pair(to_numpy(std::move(smallest)), to_numpy(std::move(largest)));
@@ -357,12 +424,11 @@ nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& sp
 }  // namespace
 
 NB_MODULE(_kernels, m) {
-    m.def("match_facets", &match_facets_py, "simplices"_a.noconvert(), "n"_a);
-    m.def("orient", &orient_py, "simplices"_a.noconvert(), "mates"_a.noconvert());
+    m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
-    m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "movable"_a.noconvert(), "stars"_a,
+    m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "visited"_a.noconvert(), "mesh"_a,
           "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
           "threads"_a);
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
@@ -381,17 +447,29 @@ NB_MODULE(_kernels, m) {
         .def("evaluate", &evaluate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a,
              "threads"_a);
 
-    nb::class_<PyStars>(m, "Stars")
-        .def("__init__", &init_stars, "simplices"_a.noconvert(), "n"_a)
-        .def_prop_ro("offsets", &view<&Stars::offsets>)
-        .def_prop_ro("incident", &view<&Stars::incident>)
-        .def_prop_ro("faces", &view<&Stars::faces>)
-        .def_prop_ro("neighbour_offsets", &view<&Stars::neighbour_offsets>)
-        .def_prop_ro("neighbours", &view<&Stars::neighbours>)
-        .def_prop_ro("block_offsets", &view<&Stars::block_offsets>)
-        .def_prop_ro("block_vertices", &view<&Stars::block_vertices>)
-        .def_prop_ro("colour_offsets", &view<&Stars::colour_offsets>)
-        .def_prop_ro("colour_blocks", &view<&Stars::colour_blocks>);
+    nb::class_<PyConnectivity>(m, "Connectivity")
+        .def("__init__", &init_connectivity, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a)
+        .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
+        .def("build_stars", &build_stars_py, "threads"_a)
+        .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
+        .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a)
+        .def("summarise", &summarise_py, "points"_a.noconvert(), "threads"_a)
+        .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })
+        .def_prop_ro("orientable", [](PyConnectivity& self) { return self.mesh.orientable; })
+        .def_prop_ro("simplices", &rows_view<&Connectivity::simplices>)
+        .def_prop_ro("mates", &rows_view<&Connectivity::mates>)
+        .def_prop_ro("vertices", &view<&Connectivity::vertices>)
+        .def_prop_ro("rows", &view<&Connectivity::rows>)
+        .def_prop_ro("component", &view<&Connectivity::component>)
+        .def_prop_ro("against", &view<&Connectivity::against>)
+        .def_prop_ro("offsets", &view<&Connectivity::offsets>)
+        .def_prop_ro("corners", &view<&Connectivity::corners>)
+        .def_prop_ro("faces", &view<&Connectivity::faces>)
+        .def_prop_ro("neighbour_offsets", &view<&Connectivity::neighbour_offsets>)
+        .def_prop_ro("neighbours", &view<&Connectivity::neighbours>)
+        .def_prop_ro("colour_offsets", &view<&Connectivity::colour_offsets>)
+        .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
+    m.attr("BLOCK_SIZE") = BLOCK_SIZE;
 
     static_assert(static_cast<int>(Move::untangle_heights) == 5, "the codes of untangle.Move");
 }

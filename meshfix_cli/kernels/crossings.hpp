@@ -40,7 +40,7 @@ template <int D>
 class Crossings {
    public:
     Crossings(const double* points, const std::int32_t* facets, std::int64_t count)
-        : points_(points), facets_(facets), order_(count) {
+        : points_(points), facets_(facets), order_(count), leaves_(count) {
         std::iota(order_.begin(), order_.end(), 0);
         if (count > 0) build(0, 0, count);
     }
@@ -70,6 +70,10 @@ class Crossings {
                 high[k] = std::max(high[k], p[k]);
             }
         }
+        void add(const Box& other) {
+            add(other.low);
+            add(other.high);
+        }
         bool meets(const Box& other) const {
             bool meets = true;
             for (int k = 0; k < D; ++k) meets &= low[k] <= other.high[k] && other.low[k] <= high[k];
@@ -87,17 +91,17 @@ class Crossings {
         return box;
     }
 
-    // Cut in two halves along the longest side of the box.
+    // Cut in two halves along the longest side of the box of the first vertices.
     void build(std::size_t node, std::int64_t begin, std::int64_t end) {
         if (boxes_.size() <= node) boxes_.resize(2 * node + 1);
-        Box box = box_of(order_[begin]);
-        for (std::int64_t i = begin + 1; i < end; ++i) {
-            const Box other = box_of(order_[i]);
-            box.add(other.low);
-            box.add(other.high);
+        if (end - begin <= LEAF) {
+            for (std::int64_t i = begin; i < end; ++i) leaves_[i] = box_of(order_[i]);
+            boxes_[node] = leaves_[begin];
+            for (std::int64_t i = begin + 1; i < end; ++i) boxes_[node].add(leaves_[i]);
+            return;
         }
-        boxes_[node] = box;
-        if (end - begin <= LEAF) return;
+        Box box{vertex(order_[begin], 0), vertex(order_[begin], 0)};
+        for (std::int64_t i = begin; i < end; ++i) box.add(vertex(order_[i], 0));
         int axis = 0;
         for (int c = 1; c < D; ++c)
             if (box.high[c] - box.low[c] > box.high[axis] - box.low[axis]) axis = c;
@@ -109,6 +113,8 @@ class Crossings {
                          });
         build(2 * node + 1, begin, middle);
         build(2 * node + 2, middle, end);
+        boxes_[node] = boxes_[2 * node + 1];
+        boxes_[node].add(boxes_[2 * node + 2]);
     }
 
     // Appends pairs until there are `full` numbers.
@@ -122,7 +128,7 @@ class Crossings {
             return;
         }
         for (std::int64_t i = begin; i < end; ++i)
-            if (order_[i] > facet && box_of(order_[i]).meets(box) && cross(facet, order_[i]))
+            if (order_[i] > facet && leaves_[i].meets(box) && cross(facet, order_[i]))
                 found.insert(found.end(), {facet, order_[i]});
     }
 
@@ -153,7 +159,7 @@ class Crossings {
     const double* points_;
     const std::int32_t* facets_;
     std::vector<std::int32_t> order_;
-    std::vector<Box> boxes_;
+    std::vector<Box> leaves_, boxes_;  // of the facets in `order_`, of the nodes
 };
 
 }  // namespace meshfix

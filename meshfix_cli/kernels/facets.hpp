@@ -1,4 +1,4 @@
-// Facets: which simplex lies on the other side of each, and whether the two are numbered consistently.
+// Facets: which simplex lies on the other side of each, and which simplices are joined through them.
 //
 // simplices (m, D+1) vertex numbers; a corner is simplex * (D+1) + position and also names the facet opposite it.
 // mates (m, D+1): the corner on the other side of the facet opposite each corner, -1 where there is none.
@@ -8,7 +8,9 @@
 #include <utility>
 #include <vector>
 
+#include "parallel.hpp"
 #include "simplex.hpp"
+#include "small_map.hpp"
 
 namespace meshfix {
 
@@ -17,15 +19,40 @@ struct Incidence {
     std::vector<std::int32_t> offsets, corners;
 };
 
+// Corners are put into bins of vertices first, then in order inside each: both passes stay in the cache, and each of
+// their items works by itself.
 template <int D>
-Incidence incidence(const std::int32_t* simplices, std::int64_t m, std::int64_t n) {
+Incidence incidence(const std::int32_t* simplices, std::int64_t m, std::int64_t n, int threads) {
+    constexpr std::int64_t BIN = 4096;
+    const std::int64_t corners = m * (D + 1), bins = n / BIN + 1, parts = 64;
+    const std::int64_t size = std::max(PER_ITEM, corners / parts + 1);
+    std::vector<std::int64_t> next(bins * parts + 1, 0);  // where in `binned` a part's next corner of a bin goes
+    for_each_range(corners, size, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t part) {
+        for (std::int64_t c = begin; c < end; ++c) ++next[simplices[c] / BIN * parts + part + 1];
+    });
+    for (std::size_t i = 1; i < next.size(); ++i) next[i] += next[i - 1];
+    std::vector<std::int64_t> starts(bins + 1);
+    for (std::int64_t b = 0; b <= bins; ++b) starts[b] = next[b * parts];
+    std::vector<std::int32_t> binned(corners);
+    for_each_range(corners, size, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t part) {
+        for (std::int64_t c = begin; c < end; ++c)
+            binned[next[simplices[c] / BIN * parts + part]++] = static_cast<std::int32_t>(c);
+    });
     Incidence csr;
-    csr.offsets.assign(n + 1, 0);
-    csr.corners.resize(m * (D + 1));
-    for (std::int64_t c = 0; c < m * (D + 1); ++c) ++csr.offsets[simplices[c] + 1];
-    for (std::int64_t v = 0; v < n; ++v) csr.offsets[v + 1] += csr.offsets[v];
-    std::vector<std::int32_t> next(csr.offsets.begin(), csr.offsets.end() - 1);
-    for (std::int64_t c = 0; c < m * (D + 1); ++c) csr.corners[next[simplices[c]]++] = static_cast<std::int32_t>(c);
+    csr.offsets.resize(n + 1);
+    csr.corners.resize(corners);
+    for_each_range(n, BIN, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t bin) {
+        std::array<std::int32_t, BIN> place{};
+        for (std::int64_t i = starts[bin]; i < starts[bin + 1]; ++i) ++place[simplices[binned[i]] - begin];
+        auto at = static_cast<std::int32_t>(starts[bin]);
+        for (std::int64_t v = begin; v < end; ++v) {
+            csr.offsets[v] = at;
+            at += std::exchange(place[v - begin], at);
+        }
+        for (std::int64_t i = starts[bin]; i < starts[bin + 1]; ++i)
+            csr.corners[place[simplices[binned[i]] - begin]++] = binned[i];
+    });
+    csr.offsets[n] = static_cast<std::int32_t>(corners);
     return csr;
 }
 
@@ -35,10 +62,10 @@ template <int D>
 bool is_odd(const std::int32_t* simplices, std::int64_t corner) {
     const std::int32_t* simplex = simplices + corner / (D + 1) * (D + 1);
     const auto& face = opposite_face<D>(static_cast<int>(corner % (D + 1)));
-    int inversions = 0;
+    bool odd = false;
     for (int i = 0; i < D; ++i)
-        for (int j = i + 1; j < D; ++j) inversions += simplex[face[i]] > simplex[face[j]];
-    return inversions % 2 == 1;
+        for (int j = i + 1; j < D; ++j) odd ^= simplex[face[i]] > simplex[face[j]];
+    return odd;
 }
 
 struct Facets {
@@ -46,82 +73,168 @@ struct Facets {
     std::int64_t crowded = -1;  // a corner whose facet has three simplices, or two that are the same; -1: none
 };
 
+// Each facet is matched at its smallest vertex.
 template <int D>
-Facets match_facets(const std::int32_t* simplices, std::int64_t m, std::int64_t n) {
-    const Incidence csr = incidence<D>(simplices, m, n);
+Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Incidence& csr, int threads) {
+    constexpr std::int64_t VERTICES = 1024;
+    const auto n = static_cast<std::int64_t>(csr.offsets.size()) - 1;
     Facets facets;
     facets.mates.assign(m * (D + 1), -1);
-    std::vector<std::pair<std::uint64_t, std::int32_t>> at_vertex;  // the facets whose smallest vertex is v
-    for (std::int64_t v = 0; v < n; ++v) {
-        at_vertex.clear();
-        for (std::int32_t i = csr.offsets[v]; i < csr.offsets[v + 1]; ++i) {
-            const std::int32_t first = csr.corners[i] / (D + 1) * (D + 1);
-            for (int j = 0; j <= D; ++j) {
-                std::uint64_t others[2] = {0, 0};
-                int count = 0;
-                for (int k = 0; k <= D; ++k) {
-                    const std::int32_t u = simplices[first + k];
-                    if (k != j && u > v) others[count++ & 1] = static_cast<std::uint64_t>(u);
+    std::vector<std::int64_t> crowded(n / VERTICES + 1, -1);
+    for_each_range(n, VERTICES, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        thread_local SmallMap<std::uint64_t> at_vertex;  // the corner opposite a facet, by the facet's other vertices
+        for (std::int64_t v = begin; v < end; ++v) {
+            at_vertex.clear(static_cast<std::size_t>(D) * (csr.offsets[v + 1] - csr.offsets[v]));
+            for (std::int32_t i = csr.offsets[v]; i < csr.offsets[v + 1]; ++i) {
+                const std::int32_t here = csr.corners[i] % (D + 1), first = csr.corners[i] - here;
+                const std::int32_t* simplex = simplices + first;
+                for (int j = 0; j <= D; ++j) {
+                    if (j == here) continue;
+                    std::uint64_t low = ~std::uint64_t{0}, high = 0;
+                    for (int k = 0; k <= D; ++k) {
+                        if (k == here || k == j) continue;
+                        low = std::min<std::uint64_t>(low, simplex[k]);
+                        high = std::max<std::uint64_t>(high, simplex[k]);
+                    }
+                    if (low < static_cast<std::uint64_t>(v)) continue;
+                    bool is_new = false;
+                    std::int32_t& other = at_vertex.find(low << 32 | high, first + j, is_new);
+                    if (is_new) continue;
+                    if (other < 0 || simplices[other] == simplices[first + j]) {
+                        crowded[item] = first + j;
+                        return;
+                    }
+                    facets.mates[other] = first + j;
+                    facets.mates[first + j] = other;
+                    other = -1;
                 }
-                if (first + j == csr.corners[i] || count != D - 1) continue;
-                if (D == 3 && others[0] > others[1]) std::swap(others[0], others[1]);
-                at_vertex.emplace_back(others[0] << 32 | others[1], first + j);
             }
         }
-        std::sort(at_vertex.begin(), at_vertex.end());
-        for (std::size_t i = 0; i + 1 < at_vertex.size(); ++i) {
-            if (at_vertex[i].first != at_vertex[i + 1].first) continue;
-            const std::int32_t a = at_vertex[i].second, b = at_vertex[i + 1].second;
-            const bool third = i + 2 < at_vertex.size() && at_vertex[i + 2].first == at_vertex[i].first;
-            if (third || simplices[a] == simplices[b]) {
-                facets.crowded = a;
-                return facets;
-            }
-            facets.mates[a] = b;
-            facets.mates[b] = a;
-        }
-    }
+    });
+    for (std::int64_t corner : crowded)
+        if (facets.crowded < 0) facets.crowded = corner;
     return facets;
+}
+
+// Facets all of whose vertices are fixed, each once, with the simplex that has it, or the first of two.
+struct FixedFacets {
+    std::vector<std::int32_t> vertices, owners;  // (f, D), (f,)
+};
+
+template <int D>
+FixedFacets fixed_facets(const std::int32_t* simplices, const std::int32_t* mates, std::int64_t m,
+                         const std::uint8_t* movable, int threads) {
+    std::vector<FixedFacets> parts(m / PER_ITEM + 1);
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (auto s = static_cast<std::int32_t>(begin); s < end; ++s) {
+            const std::int32_t* simplex = simplices + static_cast<std::int64_t>(s) * (D + 1);
+            int free = 0;
+            for (int k = 0; k <= D; ++k) free += movable[simplex[k]] != 0;
+            for (int k = 0; k <= D; ++k) {
+                const std::int64_t corner = static_cast<std::int64_t>(s) * (D + 1) + k;
+                if (free != (movable[simplex[k]] != 0) || (mates[corner] >= 0 && mates[corner] < corner)) continue;
+                for (int position : opposite_face<D>(k)) parts[item].vertices.push_back(simplex[position]);
+                parts[item].owners.push_back(s);
+            }
+        }
+    });
+    FixedFacets found;
+    for (const auto& part : parts) {
+        found.vertices.insert(found.vertices.end(), part.vertices.begin(), part.vertices.end());
+        found.owners.insert(found.owners.end(), part.owners.begin(), part.owners.end());
+    }
+    return found;
 }
 
 struct Orientation {
     std::vector<std::int32_t> component;  // (m,) simplices joined through facets have the same number
     std::vector<std::uint8_t> against;    // (m,) 1: numbered against the first simplex of its component
-    std::int64_t components = 0;
     bool orientable = true;
 };
 
-// Breadth first through the facets.
-template <int D>
-Orientation orient(const std::int32_t* simplices, const std::int32_t* mates, std::int64_t m) {
-    Orientation result;
-    result.component.assign(m, -1);
-    result.against.assign(m, 0);
-    std::vector<std::int32_t> queue;
-    queue.reserve(m);
-    for (std::int64_t seed = 0; seed < m; ++seed) {
-        if (result.component[seed] >= 0) continue;
-        result.component[seed] = static_cast<std::int32_t>(result.components);
-        queue.assign(1, static_cast<std::int32_t>(seed));
-        for (std::size_t head = 0; head < queue.size(); ++head) {
-            const std::int64_t s = queue[head];
-            for (std::int64_t corner = s * (D + 1); corner < (s + 1) * (D + 1); ++corner) {
-                const std::int64_t mate = mates[corner];
-                if (mate < 0) continue;
-                const std::int64_t t = mate / (D + 1);
-                const bool consistent = is_odd<D>(simplices, corner) != is_odd<D>(simplices, mate);
-                const std::uint8_t against = result.against[s] ^ static_cast<std::uint8_t>(!consistent);
-                if (result.component[t] < 0) {
-                    result.component[t] = static_cast<std::int32_t>(result.components);
-                    result.against[t] = against;
-                    queue.push_back(static_cast<std::int32_t>(t));
-                } else if (result.against[t] != against) {
-                    result.orientable = false;
-                }
+// Disjoint sets of simplices. Each points to one before it of its set, and knows whether the two are numbered
+// against each other.
+class Union {
+ public:
+    explicit Union(std::int64_t m) : parent_(m), against_(m, 0) {
+        for (std::int64_t s = 0; s < m; ++s) parent_[s] = static_cast<std::int32_t>(s);
+    }
+
+    // Joins two simplices; false: they are in one set, and that says otherwise.
+    bool join(std::int32_t s, std::int32_t t, bool against) {
+        against ^= climb(s);
+        against ^= climb(t);
+        if (s == t) return !against;
+        if (s < t) std::swap(s, t);
+        parent_[s] = t;
+        against_[s] = static_cast<std::uint8_t>(against);
+        return true;
+    }
+
+    // Sets are numbered by their first simplices.
+    Orientation result() && {
+        std::int32_t sets = 0;
+        Orientation result;
+        result.component.resize(parent_.size());
+        for (std::size_t s = 0; s < parent_.size(); ++s) {
+            const std::int32_t p = parent_[s];
+            if (p == static_cast<std::int32_t>(s)) {
+                result.component[s] = sets++;
+            } else {
+                result.component[s] = result.component[p];
+                against_[s] ^= against_[p];
             }
         }
-        ++result.components;
+        result.against = std::move(against_);
+        return result;
     }
+
+ private:
+    // Goes up to the first of the set, halving the way for the next who comes.
+    bool climb(std::int32_t& s) {
+        bool against = false;
+        while (parent_[s] != s) {
+            const std::int32_t p = parent_[s];
+            if (parent_[p] != p) {
+                against_[s] ^= against_[p];
+                parent_[s] = parent_[p];
+            }
+            against ^= against_[s] != 0;
+            s = parent_[s];
+        }
+        return against;
+    }
+
+    std::vector<std::int32_t> parent_;
+    std::vector<std::uint8_t> against_;
+};
+
+// Each item joins the simplices inside a range; what joins ranges comes last.
+template <int D>
+Orientation orient(const std::int32_t* simplices, const std::int32_t* mates, std::int64_t m, int threads) {
+    constexpr std::int64_t RANGE = 65536;
+    Union sets(m);
+    std::atomic<bool> orientable{true};
+    std::vector<std::vector<std::int32_t>> later(m / RANGE + 1);  // corners whose mates are in another range
+    const auto join = [&](std::int32_t corner) {
+        const std::int32_t mate = mates[corner];
+        const bool against = is_odd<D>(simplices, corner) == is_odd<D>(simplices, mate);
+        if (!sets.join(corner / (D + 1), mate / (D + 1), against)) orientable = false;
+    };
+    for_each_range(m, RANGE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (auto c = static_cast<std::int32_t>(begin * (D + 1)); c < end * (D + 1); ++c) {
+            if (mates[c] < c) continue;
+            if (mates[c] < end * (D + 1)) {
+                join(c);
+            } else {
+                later[item].push_back(c);
+            }
+        }
+    });
+    for (const auto& corners : later)
+        for (std::int32_t c : corners) join(c);
+    Orientation result = std::move(sets).result();
+    result.orientable = orientable;
     return result;
 }
 

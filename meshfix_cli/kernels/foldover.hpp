@@ -43,15 +43,15 @@ template <int D>
 class Foldover {
    public:
     Foldover(const std::int32_t* simplices, std::int64_t m, std::int64_t n)
-        : simplices_(simplices, simplices + m * (D + 1)), incidence_(incidence<D>(simplices, m, n)), shares_(m) {}
+        : simplices_(simplices, simplices + m * (D + 1)), incidence_(incidence<D>(simplices, m, n, 1)), shares_(m) {}
 
     // gradient (free, D). Sums run in a fixed order: over the simplices of an item, over the items, over a star.
     EnergyValue evaluate(const double* points, const double* sizes, Regularisation r, std::int64_t free,
                          double* gradient, int threads) {
         const auto m = static_cast<std::int64_t>(shares_.size());
-        std::vector<EnergyValue> parts(m / SIMPLICES_PER_ITEM + 1);
+        std::vector<EnergyValue> parts(m / PER_ITEM + 1);
         for_each_simplex<D>(points, simplices_.data(), m, threads, [&](std::int64_t s, const Edges<D>& e) {
-            EnergyValue& part = parts[s / SIMPLICES_PER_ITEM];
+            EnergyValue& part = parts[s / PER_ITEM];
             part.energy += add(s, e, sizes[s], r, part.min_det);
         });
         EnergyValue total;

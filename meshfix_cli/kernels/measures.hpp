@@ -12,8 +12,6 @@
 
 namespace meshfix {
 
-constexpr std::int64_t SIMPLICES_PER_ITEM = 16384;
-
 template <int D>
 Edges<D> edges_of(const double* points, const std::int32_t* simplex) {
     const Vec<D> first = load<D>(points + static_cast<std::int64_t>(simplex[0]) * D);
@@ -22,11 +20,7 @@ Edges<D> edges_of(const double* points, const std::int32_t* simplex) {
     return e;
 }
 
-struct AngleRange {
-    double smallest, largest;
-};
-
-// From the extreme cosines, with atan2 of sine and cosine: acos loses half the digits near 0 and 180 degrees.
+// The extreme cosines with their sines: acos alone loses half the digits near 0 and 180 degrees.
 struct ExtremeAngles {
     double largest_cosine = -2.0, sine_there = 0.0, smallest_cosine = 2.0, sine_here = 0.0;
 
@@ -34,25 +28,31 @@ struct ExtremeAngles {
         if (cosine > largest_cosine) largest_cosine = cosine, sine_there = sine;
         if (cosine < smallest_cosine) smallest_cosine = cosine, sine_here = sine;
     }
-    AngleRange range() const {
-        return {std::atan2(sine_there, largest_cosine), std::atan2(sine_here, smallest_cosine)};
+    double smallest() const { return std::atan2(sine_there, largest_cosine); }
+    double largest() const { return std::atan2(sine_here, smallest_cosine); }
+    bool wider_than(const ExtremeAngles& other) const {
+        return smallest_cosine != other.smallest_cosine ? smallest_cosine < other.smallest_cosine
+                                                        : sine_here < other.sine_here;
     }
 };
 
-inline AngleRange angles(const Edges<2>& e) {
+// Those of a simplex that has an edge or triangle of size zero.
+inline ExtremeAngles no_angles() { return {1.0, 0.0, -1.0, 0.0}; }
+
+inline ExtremeAngles angles(const Edges<2>& e) {
     const std::array<Vec<2>, 3> sides{e[0], e[1] - e[0], Vec<2>{} - e[1]};
     const double area = std::fabs(determinant(e));
     ExtremeAngles extreme;
     for (int i = 0; i < 3; ++i) {
         const Vec<2>&p = sides[i], &q = sides[(i + 2) % 3];
         const double product = std::sqrt(norm2(p)) * std::sqrt(norm2(q));
-        if (!(product > 0.0)) return {0.0, std::acos(-1.0)};
+        if (!(product > 0.0)) return no_angles();
         extreme.add(-dot(p, q) / product, area / product);
     }
-    return extreme.range();
+    return extreme;
 }
 
-inline AngleRange angles(const Edges<3>& e) {
+inline ExtremeAngles angles(const Edges<3>& e) {
     const Vec<3>&A = e[0], &B = e[1], &C = e[2];
     // Outward normals of the faces opposite the vertices 0 to 3, or all inward.
     const std::array<Vec<3>, 4> normals{cross(B - A, C - A), cross(C, B), cross(A, C), cross(B, A)};
@@ -60,7 +60,7 @@ inline AngleRange angles(const Edges<3>& e) {
     std::array<double, 4> lengths;
     for (int i = 0; i < 4; ++i) {
         lengths[i] = std::sqrt(norm2(normals[i]));
-        if (!(lengths[i] > 0.0)) return {0.0, std::acos(-1.0)};
+        if (!(lengths[i] > 0.0)) return no_angles();
     }
     // The edge between the faces opposite i and j joins the two other vertices.
     ExtremeAngles extreme;
@@ -74,39 +74,85 @@ inline AngleRange angles(const Edges<3>& e) {
     add(1, 2, C);
     add(1, 3, B);
     add(2, 3, A);
-    return extreme.range();
+    return extreme;
 }
 
 // Calls f(s, edges) for every simplex.
 template <int D, class F>
 void for_each_simplex(const double* points, const std::int32_t* simplices, std::int64_t m, int threads, const F& f) {
-    for_each_item((m + SIMPLICES_PER_ITEM - 1) / SIMPLICES_PER_ITEM, threads, [&](std::int64_t item) {
-        const std::int64_t end = std::min(m, (item + 1) * SIMPLICES_PER_ITEM);
-        for (std::int64_t s = item * SIMPLICES_PER_ITEM; s < end; ++s) f(s, edges_of<D>(points, simplices + s * (D + 1)));
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (std::int64_t s = begin; s < end; ++s) f(s, edges_of<D>(points, simplices + s * (D + 1)));
     });
 }
 
 struct Validity {
-    std::int64_t inverted = 0;
+    std::vector<std::int32_t> inverted;  // simplices, ascending
     double min_measure = INFINITY;
 };
 
-// What a sweep needs to know: only counts and minima, so the bits do not depend on the threads.
+// What a sweep needs to know: nothing of it depends on the threads.
 template <int D>
 Validity check(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
-    std::vector<Validity> parts(m / SIMPLICES_PER_ITEM + 1);
+    std::vector<Validity> parts(m / PER_ITEM + 1);
     for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
-        Validity& part = parts[s / SIMPLICES_PER_ITEM];
+        Validity& part = parts[s / PER_ITEM];
         const double det = determinant(e);
-        part.inverted += !is_valid<D>(det, longest_edge2<D>(e));
+        if (!is_valid<D>(det, longest_edge2<D>(e))) part.inverted.push_back(static_cast<std::int32_t>(s));
         part.min_measure = std::min(part.min_measure, det);
     });
     Validity total;
     for (const auto& part : parts) {
-        total.inverted += part.inverted;
+        total.inverted.insert(total.inverted.end(), part.inverted.begin(), part.inverted.end());
         total.min_measure = std::min(total.min_measure, part.min_measure);
     }
     total.min_measure /= factorial(D);
+    return total;
+}
+
+// What a report needs to know. Angles in radians.
+struct Summary {
+    std::vector<double> smallest;        // (m,) the smallest angle of each simplex
+    std::vector<std::int32_t> inverted;  // simplices, ascending
+    std::int64_t folded = 0;             // facets with both simplices on one side
+    double min_measure = INFINITY, largest = 0.0;
+};
+
+template <int D>
+Summary summarise(const double* points, const std::int32_t* simplices, const std::int32_t* mates, std::int64_t m,
+                  int threads) {
+    struct Part {
+        std::vector<std::int32_t> inverted;
+        std::int64_t folded = 0;
+        double min_det = INFINITY;
+        ExtremeAngles widest;
+    };
+    Summary total;
+    total.smallest.resize(m);
+    std::vector<std::int8_t> sign(m);
+    std::vector<Part> parts(m / PER_ITEM + 1);
+    for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
+        Part& part = parts[s / PER_ITEM];
+        const double det = determinant(e);
+        if (!is_valid<D>(det, longest_edge2<D>(e))) part.inverted.push_back(static_cast<std::int32_t>(s));
+        part.min_det = std::min(part.min_det, det);
+        sign[s] = static_cast<std::int8_t>((det > 0.0) - (det < 0.0));
+        const ExtremeAngles extreme = angles(e);
+        total.smallest[s] = extreme.smallest();
+        if (extreme.wider_than(part.widest)) part.widest = extreme;
+    });
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t c = begin * (D + 1); c < end * (D + 1); ++c)
+            parts[item].folded += mates[c] > c && sign[c / (D + 1)] * sign[mates[c] / (D + 1)] < 0;
+    });
+    ExtremeAngles widest;
+    for (const auto& part : parts) {
+        total.inverted.insert(total.inverted.end(), part.inverted.begin(), part.inverted.end());
+        total.folded += part.folded;
+        total.min_measure = std::min(total.min_measure, part.min_det);
+        if (part.widest.wider_than(widest)) widest = part.widest;
+    }
+    total.min_measure /= factorial(D);
+    total.largest = widest.largest();
     return total;
 }
 

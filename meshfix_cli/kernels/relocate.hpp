@@ -5,6 +5,7 @@
 #include "active_set.hpp"
 #include "laplacian.hpp"
 #include "linear_program.hpp"
+#include "order.hpp"
 #include "parallel.hpp"
 
 namespace meshfix {
@@ -133,20 +134,19 @@ struct Relocation {
     }
 };
 
-// blocks (blocks_count): numbers of the blocks to visit, of one colour.
+// visited (n): 1 for the vertices to relocate; blocks (count): numbers of the blocks to visit, of one colour.
 template <int D>
-Counts relocate(Move move, const StarsView& stars, double* points, const std::uint8_t* movable,
-                const std::int32_t* block_offsets, const std::int32_t* block_vertices, const std::int32_t* blocks,
-                std::int64_t blocks_count, const Parameters& parameters, int threads) {
-    std::vector<Counts> counts(blocks_count);
-    for_each_item(blocks_count, threads, [&](std::int64_t item) {
+Counts relocate(Move move, const StarsView& stars, double* points, const std::uint8_t* visited, std::int64_t n,
+                const std::int32_t* blocks, std::int64_t count, const Parameters& parameters, int threads) {
+    std::vector<Counts> counts(count);
+    for_each_item(count, threads, [&](std::int64_t item) {
         thread_local Relocation<D> work;
         work.stars = stars;
         work.points = points;
         work.parameters = parameters;
-        const std::int32_t block = blocks[item];
-        for (std::int32_t i = block_offsets[block]; i < block_offsets[block + 1]; ++i)
-            if (movable[block_vertices[i]]) work.relocate(move, block_vertices[i], counts[item]);
+        const std::int64_t begin = blocks[item] * BLOCK_SIZE;
+        for (std::int64_t v = begin; v < std::min(n, begin + BLOCK_SIZE); ++v)
+            if (visited[v]) work.relocate(move, v, counts[item]);
     });
     Counts total;
     for (const auto& c : counts) {

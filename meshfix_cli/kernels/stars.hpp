@@ -1,13 +1,12 @@
-// Stars: around each vertex its neighbours and the faces opposite it; and the blocks of vertices that are the
-// unit of parallel work.
+// What the kernels know of a mesh: its simplices in their own order, the facets between them, and the stars around
+// its vertices in blocks, which are the unit of parallel work.
 //
-// simplices (m, D+1)        vertex numbers, positively oriented
-// offsets (n+1)             rows of incident and faces
-// incident (m*(D+1))        the simplices at each vertex
-// faces (m*(D+1), D)        for each of them the opposite face, as positions in the vertex's row of neighbours
+// vertices, rows, simplices        see order.hpp; all other numbers are those of this order
+// offsets (n+1), corners           the corners at each vertex; a corner is simplex * (D+1) + position
+// mates, component, against        see facets.hpp
 // neighbour_offsets (n+1), neighbours
-// block_offsets, block_vertices    every vertex that has a star, in blocks
-// colour_offsets, colour_blocks    blocks of one colour share no edge
+// faces (m*(D+1), D)               for each of `corners` the opposite face, as positions in the vertex's neighbours
+// colour_offsets, colour_blocks    blocks of one colour share no edge; block b holds the vertices from b * BLOCK_SIZE
 #pragma once
 
 #include <cstdint>
@@ -16,133 +15,155 @@
 #include <vector>
 
 #include "facets.hpp"
+#include "order.hpp"
 
 namespace meshfix {
 
-// Large enough for a block to be mostly interior, small enough to stay in the first-level cache.
-constexpr std::size_t BLOCK_SIZE = 1024;
-
-struct Stars {
-    std::vector<std::int32_t> offsets, incident, neighbour_offsets, neighbours;
+struct Connectivity {
+    std::vector<std::int32_t> vertices, rows, simplices, offsets, corners, mates, component;
+    std::vector<std::uint8_t> against;
+    std::int64_t crowded = -1;
+    bool orientable = true;
+    std::vector<std::int32_t> neighbour_offsets, neighbours, colour_offsets, colour_blocks;
     std::vector<std::uint16_t> faces;
-    std::vector<std::int32_t> block_offsets, block_vertices, colour_offsets, colour_blocks;
+
+    std::int64_t n() const { return static_cast<std::int64_t>(vertices.size()); }
+    std::int64_t m() const { return static_cast<std::int64_t>(rows.size()); }
+    std::int64_t blocks() const { return (n() + BLOCK_SIZE - 1) / BLOCK_SIZE; }
 };
 
 template <int D>
-void build_neighbours(Stars& stars, const std::int32_t* simplices, std::int64_t n) {
-    std::vector<std::int32_t> seen_at(n, -1), position(n);
-    stars.neighbour_offsets.assign(1, 0);
-    stars.faces.resize(stars.incident.size() * D);
-    for (std::int64_t v = 0; v < n; ++v) {
-        const std::size_t row = stars.neighbours.size();
-        for (std::int32_t i = stars.offsets[v]; i < stars.offsets[v + 1]; ++i) {
-            const std::int32_t corner = stars.incident[i], first = corner / (D + 1) * (D + 1);
-            const auto& face = opposite_face<D>(corner - first);
-            for (int k = 0; k < D; ++k) {
-                const std::int32_t u = simplices[first + face[k]];
-                if (seen_at[u] != v) {
-                    seen_at[u] = static_cast<std::int32_t>(v);
-                    position[u] = static_cast<std::int32_t>(stars.neighbours.size() - row);
-                    stars.neighbours.push_back(u);
-                }
-                stars.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(position[u]);
-            }
-            stars.incident[i] = corner / (D + 1);
-        }
-        if (stars.neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
-            throw std::length_error("a vertex has more than 65,535 neighbours");
-        if (stars.neighbours.size() > std::numeric_limits<std::int32_t>::max())
-            throw std::length_error("the mesh has more than a billion edges");
-        stars.neighbour_offsets.push_back(static_cast<std::int32_t>(stars.neighbours.size()));
-    }
+Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m, int threads) {
+    Connectivity mesh;
+    Order order = order_mesh<D>(points, n, simplices, m, threads);
+    mesh.vertices = std::move(order.vertices);
+    mesh.rows = std::move(order.rows);
+    mesh.simplices = std::move(order.simplices);
+    Incidence csr = incidence<D>(mesh.simplices.data(), m, mesh.n(), threads);
+    Facets facets = match_facets<D>(mesh.simplices.data(), m, csr, threads);
+    mesh.crowded = facets.crowded;
+    if (mesh.crowded >= 0) return mesh;
+    mesh.offsets = std::move(csr.offsets);
+    mesh.corners = std::move(csr.corners);
+    mesh.mates = std::move(facets.mates);
+    Orientation orientation = orient<D>(mesh.simplices.data(), mesh.mates.data(), m, threads);
+    mesh.component = std::move(orientation.component);
+    mesh.against = std::move(orientation.against);
+    mesh.orientable = orientation.orientable;
+    return mesh;
 }
 
-// Blocks grow breadth first from the rim of those before, so they are compact whatever the points are: the order
-// of work, and with it the result, does not depend on the unit of length or on the axes.
-inline void build_blocks(Stars& stars, std::int64_t n) {
-    std::vector<std::uint8_t> taken(n, 0);
-    std::vector<std::int32_t> queued_in(n, -1);  // the last block whose queue the vertex joined
-    std::vector<std::int32_t> queue, rim;        // rim: every vertex in the order in which it was first queued
-    std::size_t queue_head = 0, rim_head = 0;
-    std::int32_t unseen = 0;
-    const auto first_free = [&](const std::vector<std::int32_t>& list, std::size_t& head) {
-        while (head < list.size())
-            if (!taken[list[head++]]) return list[head - 1];
-        return std::int32_t{-1};
+// Exchanges the first two vertices of some simplices: the other orientation. Before the stars are built.
+template <int D>
+void flip(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
+    const auto moved = [&](std::int32_t corner) {
+        const std::int32_t position = corner % (D + 1);
+        return position < 2 && flipped[corner / (D + 1)] ? corner + 1 - 2 * position : corner;
     };
-    const auto next_vertex = [&] {
-        std::int32_t v = first_free(queue, queue_head);
-        if (v < 0) v = first_free(rim, rim_head);
-        if (v >= 0) return v;
-        while (unseen < n && (taken[unseen] || stars.offsets[unseen] == stars.offsets[unseen + 1])) ++unseen;
-        return unseen;
-    };
-
-    std::int32_t block = 0;
-    std::size_t start = 0;
-    auto& vertices = stars.block_vertices;
-    const auto close_block = [&] {
-        std::sort(vertices.begin() + static_cast<std::ptrdiff_t>(start), vertices.end());
-        start = vertices.size();
-        stars.block_offsets.push_back(static_cast<std::int32_t>(start));
-        queue.clear();
-        queue_head = 0;
-        ++block;
-    };
-    stars.block_offsets.assign(1, 0);
-    for (std::int32_t v = next_vertex(); v < n; v = next_vertex()) {
-        taken[v] = 1;
-        vertices.push_back(v);
-        for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
-            const std::int32_t u = stars.neighbours[i];
-            if (taken[u] || queued_in[u] == block) continue;
-            if (queued_in[u] < 0) rim.push_back(u);
-            queued_in[u] = block;
-            queue.push_back(u);
-        }
-        if (vertices.size() - start == BLOCK_SIZE) close_block();
-    }
-    if (vertices.size() > start) close_block();
-}
-
-// Greedy, in the order of the blocks.
-inline void colour_blocks(Stars& stars, std::int64_t n) {
-    const std::size_t blocks = stars.block_offsets.size() - 1;
-    std::vector<std::int32_t> block_of(n, -1), colour(blocks, -1), forbidden_by;
-    for (std::size_t b = 0; b < blocks; ++b)
-        for (std::int32_t i = stars.block_offsets[b]; i < stars.block_offsets[b + 1]; ++i)
-            block_of[stars.block_vertices[i]] = static_cast<std::int32_t>(b);
-    for (std::size_t b = 0; b < blocks; ++b) {
-        for (std::int32_t i = stars.block_offsets[b]; i < stars.block_offsets[b + 1]; ++i) {
-            const std::int32_t v = stars.block_vertices[i];
-            for (std::int32_t j = stars.neighbour_offsets[v]; j < stars.neighbour_offsets[v + 1]; ++j) {
-                const std::int32_t c = colour[block_of[stars.neighbours[j]]];
-                if (c >= 0) forbidden_by[c] = static_cast<std::int32_t>(b);
+    for_each_range(mesh.m(), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (std::int64_t s = begin; s < end; ++s) {
+            if (flipped[s]) {
+                std::swap(mesh.simplices[s * (D + 1)], mesh.simplices[s * (D + 1) + 1]);
+                std::swap(mesh.mates[s * (D + 1)], mesh.mates[s * (D + 1) + 1]);
+            }
+            for (int k = 0; k <= D; ++k) {
+                std::int32_t& mate = mesh.mates[s * (D + 1) + k];
+                if (mate >= 0) mate = moved(mate);
+                mesh.corners[s * (D + 1) + k] = moved(mesh.corners[s * (D + 1) + k]);
             }
         }
-        std::size_t c = 0;
-        while (c < forbidden_by.size() && forbidden_by[c] == static_cast<std::int32_t>(b)) ++c;
-        if (c == forbidden_by.size()) forbidden_by.push_back(-1);
-        colour[b] = static_cast<std::int32_t>(c);
-    }
-    stars.colour_offsets.assign(1, 0);
-    for (std::size_t c = 0; c < forbidden_by.size(); ++c) {
-        for (std::size_t b = 0; b < blocks; ++b)
-            if (colour[b] == static_cast<std::int32_t>(c)) stars.colour_blocks.push_back(static_cast<std::int32_t>(b));
-        stars.colour_offsets.push_back(static_cast<std::int32_t>(stars.colour_blocks.size()));
-    }
+    });
 }
 
 template <int D>
-Stars build_stars(const std::int32_t* simplices, std::int64_t m, std::int64_t n) {
-    Stars stars;
-    Incidence csr = incidence<D>(simplices, m, n);
-    stars.offsets = std::move(csr.offsets);
-    stars.incident = std::move(csr.corners);
-    build_neighbours<D>(stars, simplices, n);
-    build_blocks(stars, n);
-    colour_blocks(stars, n);
-    return stars;
+void build_neighbours(Connectivity& mesh, int threads) {
+    mesh.faces.resize(mesh.corners.size() * D);
+    mesh.neighbour_offsets.assign(mesh.n() + 1, 0);
+    std::vector<std::vector<std::int32_t>> found(mesh.blocks());
+    for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
+        thread_local SmallMap<std::uint32_t> positions;
+        auto& neighbours = found[block];
+        for (std::int64_t v = begin; v < end; ++v) {
+            const std::size_t row = neighbours.size();
+            positions.clear(static_cast<std::size_t>(D) * (mesh.offsets[v + 1] - mesh.offsets[v]));
+            for (std::int32_t i = mesh.offsets[v]; i < mesh.offsets[v + 1]; ++i) {
+                const std::int32_t here = mesh.corners[i] % (D + 1);
+                const std::int32_t* simplex = &mesh.simplices[mesh.corners[i] - here];
+                const auto& face = opposite_face<D>(here);
+                for (int k = 0; k < D; ++k) {
+                    const std::int32_t u = simplex[face[k]];
+                    bool is_new = false;
+                    const std::int32_t position = positions.find(
+                        static_cast<std::uint32_t>(u), static_cast<std::int32_t>(neighbours.size() - row), is_new);
+                    if (is_new) neighbours.push_back(u);
+                    mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(position);
+                }
+            }
+            if (neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
+                throw std::length_error("a vertex has more than 65,535 neighbours");
+            mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(neighbours.size() - row);
+        }
+    });
+    std::int64_t total = 0;
+    for (std::int64_t v = 0; v < mesh.n(); ++v) {
+        total += mesh.neighbour_offsets[v + 1];
+        if (total > std::numeric_limits<std::int32_t>::max())
+            throw std::length_error("the mesh has more than a billion edges");
+        mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(total);
+    }
+    mesh.neighbours.resize(total);
+    for_each_item(mesh.blocks(), threads, [&](std::int64_t block) {
+        std::copy(found[block].begin(), found[block].end(),
+                  mesh.neighbours.begin() + mesh.neighbour_offsets[block * BLOCK_SIZE]);
+        std::vector<std::int32_t>().swap(found[block]);
+    });
+}
+
+// Greedy, in the order of the blocks.
+inline void colour_blocks(Connectivity& mesh, int threads) {
+    std::vector<std::vector<std::int32_t>> touching(mesh.blocks());  // the blocks before each that touch it
+    for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
+        auto& others = touching[block];
+        for (std::int32_t i = mesh.neighbour_offsets[begin]; i < mesh.neighbour_offsets[end]; ++i) {
+            const auto other = static_cast<std::int32_t>(mesh.neighbours[i] / BLOCK_SIZE);
+            if (other < block && (others.empty() || others.back() != other)) others.push_back(other);
+        }
+    });
+    std::vector<std::int32_t> colour(mesh.blocks()), forbidden_by;
+    for (std::int32_t block = 0; block < mesh.blocks(); ++block) {
+        for (std::int32_t other : touching[block]) forbidden_by[colour[other]] = block;
+        std::size_t c = 0;
+        while (c < forbidden_by.size() && forbidden_by[c] == block) ++c;
+        if (c == forbidden_by.size()) forbidden_by.push_back(-1);
+        colour[block] = static_cast<std::int32_t>(c);
+    }
+    mesh.colour_offsets.assign(1, 0);
+    for (std::int32_t c = 0; c < static_cast<std::int32_t>(forbidden_by.size()); ++c) {
+        for (std::int32_t block = 0; block < mesh.blocks(); ++block)
+            if (colour[block] == c) mesh.colour_blocks.push_back(block);
+        mesh.colour_offsets.push_back(static_cast<std::int32_t>(mesh.colour_blocks.size()));
+    }
+}
+
+// Where that is not done yet.
+template <int D>
+void build_stars(Connectivity& mesh, int threads) {
+    if (!mesh.colour_offsets.empty()) return;
+    build_neighbours<D>(mesh, threads);
+    colour_blocks(mesh, threads);
+}
+
+// Marks the vertices of all simplices that have a marked one.
+template <int D>
+void grow(const Connectivity& mesh, std::vector<std::uint8_t>& marked) {
+    const std::vector<std::uint8_t> before = marked;
+    for (std::int64_t s = 0; s < mesh.m(); ++s) {
+        const std::int32_t* simplex = &mesh.simplices[s * (D + 1)];
+        bool any = false;
+        for (int k = 0; k <= D; ++k) any |= before[simplex[k]] != 0;
+        if (!any) continue;
+        for (int k = 0; k <= D; ++k) marked[simplex[k]] = 1;
+    }
 }
 
 }  // namespace meshfix

@@ -19,6 +19,9 @@ constexpr double LP_AXIS2 = 0.1;            // squared length, of the largest, a
 constexpr int LP_BLAND_AFTER = 20;          // plus one per face: pivots before Bland's rule
 constexpr int LP_MAX_PIVOTS = 1000;         // plus ten per face: never reached with Bland's rule but for rounding
 
+// Order: squared distance, of the largest, at which a vertex may set an axis.
+constexpr double ORDER_AXIS2 = 0.8;
+
 // Active-set method. Function values are sines; lengths are in star sizes.
 constexpr double ACTIVE = 1e-4;           // a sine this close to the smallest is active
 constexpr double ACTIVE_MIN_STEP = 1e-6;  // stopping rule 1

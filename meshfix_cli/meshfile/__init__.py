@@ -43,6 +43,7 @@ def read(
     *,
     double: bool = False,
     fix_orientation: bool = False,
+    threads: int = 1,
 ) -> Document:
     """Read a triangle or tetrahedral mesh.
 
@@ -58,6 +59,7 @@ def read(
         Make coordinates in float32 those of a file in float64.
     fix_orientation : bool
         Renumber the simplices that have the negative orientation, by exchanging two of their vertices.
+    threads : int
 
     Raises
     ------
@@ -77,11 +79,11 @@ def read(
         source = _parse(data, form, beside)
         if double and source.points.dtype != np.float64:
             source = _promoted(data, form)
-        document = build(name, source, form, fix, regions)
+        document = build(name, source, form, fix, regions, threads)
         rows = document.reversed_cells() if fix_orientation else {}
         if rows:
             note = f"renumbered {counted(sum(map(len, rows.values())), *CELL_NAMES[document.mesh.dimension])}"
-            document = build(name, _with_reversed(document.source, rows, form), form, fix, regions)
+            document = build(name, _with_reversed(document.source, rows, form), form, fix, regions, threads)
             document = replace(document, notes=(*document.notes, note))
         return document
     except MeshfixError as error:

@@ -110,7 +110,7 @@ class Document:
         return {run: here for run, here in found.items() if len(here)}
 
 
-def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None) -> Document:
+def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None, threads: int = 1) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
     dimension = _dimension(source)
     if regions is not None:
@@ -126,7 +126,7 @@ def build(name: str, source: Source, form: Format, fix: str | None, regions: str
         held["by the file"] = source.held
     if fix is not None:
         held[f"by --fix {fix}"] = _fixed_by(source, fix)
-    mesh = Mesh.build(points, simplices)
+    mesh = Mesh.build(points, simplices, threads=threads)
     topology = mesh.topology
     reasons = {"on the boundary": topology.boundary}
     for key in source.regions:

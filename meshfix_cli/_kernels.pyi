@@ -70,6 +70,9 @@ def check_simplices(simplices: Int32, n: int, threads: int) -> tuple[int, int]:
 def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
     """Rows of the inverted simplices, and the smallest signed measure."""
 
+def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
+    """Return the smallest sign * sine^2 of all simplices; -1 where one is not valid."""
+
 def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
     """Signed measure and validity, each (m,)."""
 
@@ -90,7 +93,7 @@ def relocate(
 ) -> tuple[int, int]:
     """Relocate, in place, the vertices to visit (n,) of some blocks of one colour; the numbers visited and moved.
 
-    Smoothing makes no measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
+    The threshold is that of the active-set method, or the floor of MEAN_RATIO. Smoothing makes no measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
 def linear_program(

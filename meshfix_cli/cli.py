@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 import click
 
@@ -59,6 +59,15 @@ class _Distance(click.ParamType):  # type: ignore[type-arg]
             return value if isinstance(value, Distance) else Distance.parse(value)
         except ValueError:
             self.fail(f"{value!r} is neither a length such as 0.3 nor in mean edge lengths such as 2h", param, ctx)
+
+
+class _Passes(click.IntRange):
+    """A number of smoothing passes, or "best"."""
+
+    name = "PASSES|best"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        return value if value == "best" else super().convert(value, param, ctx)
 
 
 class _Requirement(click.ParamType):  # type: ignore[type-arg]
@@ -320,7 +329,14 @@ def main() -> None:
     type=click.IntRange(0),
     help="Untangling sweeps at most, all phases together. [default: as each needs]",
 )
-@click.option("--smooth", type=click.IntRange(0), default=SMOOTH, show_default=True, help="Smoothing passes.")
+@click.option(
+    "--smooth",
+    type=_Passes(0),
+    metavar="PASSES|best",
+    default=SMOOTH,
+    show_default=True,
+    help="Smoothing passes; best: then the mean, then the smallest angle up to its ceiling, at three times the cost.",
+)
 @click.option(
     "--threshold",
     type=_Range(0, 90),
@@ -341,7 +357,7 @@ def untangle(
     show: _Show,
     strategy: str,
     sweeps: int | None,
-    smooth: int,
+    smooth: int | Literal["best"],
     threshold: float | None,
     max_move: Distance | None,
     only_invalid: bool,

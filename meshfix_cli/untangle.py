@@ -26,6 +26,10 @@ SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
 SMOOTH = 3  # section 4: three passes of smoothing
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
+MEAN_SWEEPS = 4  # of the mean ratio: later ones gain less than a hundredth of a degree
+RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
+RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
+RAISE_PATIENCE = 2
 PATIENCE = 3  # turns through the moves of a phase without progress after which it has stalled
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
@@ -40,6 +44,8 @@ class Move(IntEnum):
     SMART_LAPLACIAN = 3
     COMBINED_SMOOTH = 4
     UNTANGLE_HEIGHTS = 5
+    MEAN_RATIO = 6
+    RAISE_SMALLEST = 7
 
 
 @dataclass(frozen=True)
@@ -54,10 +60,11 @@ class Phase:
         Those of the sweeps, in turn. None: the phase minimises the energy of `foldover.py`.
     max_sweeps : int or None
         None: the limit of all untangling sweeps, `SWEEPS` where there is none.
-    until : {"valid", "stalled", "settled"}
+    until : {"valid", "stalled", "settled", "ceiling"}
         When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for `PATIENCE`
         turns through the moves neither were there fewer inverted elements nor was the smallest measure larger;
-        "settled": no vertex moved, which stops every phase.
+        "settled": no vertex moved, which stops every phase; "ceiling": the smallest angle is that of the simplices
+        without a free vertex, or does not rise any more. The last two are phases of smoothing.
     only_invalid : bool
         LP moves visit only stars with an inverted element and those whose neighbours moved in the sweep before.
     from_best : bool
@@ -70,10 +77,15 @@ class Phase:
     name: str
     moves: tuple[Move, ...] = ()
     max_sweeps: int | None = None
-    until: Literal["valid", "stalled", "settled"] = "valid"
+    until: Literal["valid", "stalled", "settled", "ceiling"] = "valid"
     only_invalid: bool = False
     from_best: bool = False
     rings: tuple[int | None, ...] = ()
+
+    @property
+    def smooths(self) -> bool:
+        """Whether it is a phase of smoothing."""
+        return self.until in ("settled", "ceiling")
 
 
 _LAPLACIAN = Phase("Laplacian", (Move.LAPLACIAN,))
@@ -94,6 +106,13 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "LUS": (replace(_LAPLACIAN, max_sweeps=3), _LP),
     "FF": (_FOLDOVER,),
 }
+
+
+# After the passes at the threshold: the mean, then the few stars that are below the ceiling.
+_BEST = (
+    Phase(f"{SMOOTHING} the mean", (Move.MEAN_RATIO,), MEAN_SWEEPS, until="settled"),
+    Phase(f"{SMOOTHING} the worst", (Move.RAISE_SMALLEST,), until="ceiling"),
+)
 
 
 @dataclass(frozen=True)
@@ -145,9 +164,12 @@ class Outcome:
         return self.records[-1].inverted == 0 and not (self.obstacles or self.after.topology.misnumbered.any())
 
 
-def plan(strategy: str, smooth: int = SMOOTH) -> tuple[Phase, ...]:
-    """Return the phases of a strategy, and `smooth` smoothing passes."""
-    return (*STRATEGIES[strategy], Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), smooth, until="settled", from_best=True))
+def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH) -> tuple[Phase, ...]:
+    """Return the phases of a strategy and those of smoothing: so many passes, or the best that can be had."""
+    passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), SMOOTH, until="settled", from_best=True)
+    if smooth == "best":
+        return (*STRATEGIES[strategy], passes, *_BEST)
+    return (*STRATEGIES[strategy], replace(passes, max_sweeps=smooth))
 
 
 def steps(
@@ -189,7 +211,7 @@ def steps(
     if run.record.inverted == 0 and (only_invalid or _meets_target(mesh, degrees, threads)):
         return
     for phase in phases:
-        untangling = phase.until != "settled"
+        untangling = not phase.smooths
         if untangling and run.left == 0:
             continue
         limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
@@ -223,6 +245,11 @@ def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
     return bool(smallest.min(initial=math.pi) >= math.radians(degrees))
 
 
+def _raised(sine2: float, degrees: float) -> float:
+    """Return the sine^2 of an angle that is larger by some degrees."""
+    return math.sin(min(math.asin(math.sqrt(sine2)) + math.radians(degrees), math.pi / 2)) ** 2
+
+
 class _Run:
     """The positions between two sweeps, and the best so far by what can be mended: simplices that have a free vertex.
 
@@ -239,12 +266,13 @@ class _Run:
         self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
         self.reach = Reach(self.points, max_move)
-        stuck = self.stars.simplices[mesh.stuck()]
-        inverted = _kernels.check(self.points, stuck, threads)[0]
+        stuck = mesh.stuck()
+        self.stuck = self.stars.simplices[stuck]
+        inverted = _kernels.check(self.points, self.stuck, threads)[0]
         self.mendable = self.stars.simplices
         if len(inverted):
-            self.mendable = np.delete(self.mendable, mesh.stuck()[inverted], axis=0)
-        self.beyond_repair = len(inverted), _kernels.check(self.points, stuck[inverted], threads)[1]
+            self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
+        self.beyond_repair = len(inverted), _kernels.check(self.points, self.stuck[inverted], threads)[1]
         self.changed = np.zeros(len(self.points), dtype=bool)
         self._check()
         self.record = self._record("input", 0, 0)
@@ -272,7 +300,10 @@ class _Run:
     def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         """Yield the points after each sweep; the caller adds them before it asks for the next."""
         self.changed[:] = False
-        return self._relocations(phase) if phase.moves else self._minimisations(phase)
+        if not phase.moves:
+            return self._minimisations(phase)
+        near = self._grown(self.near, NEAR) if self.only_invalid and phase.smooths else self.near
+        return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
 
     def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
         """Take the points of a sweep; return whether there was progress."""
@@ -324,24 +355,39 @@ class _Run:
         """(n,) bool: free vertices among these and `rings` rings of neighbours around them."""
         return self.free & self.stars.grown(vertices, rings).view(bool)
 
-    def _relocations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        near = self.near
-        if self.only_invalid and phase.until == "settled":
-            near = self._grown(near, NEAR)
-        visited = near
+    def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        threshold, visited = self.threshold_sine2, near
+        if Move.MEAN_RATIO in phase.moves:
+            threshold = max(threshold, self._min_sine2(self.mendable))
         for move in cycle(phase.moves):
             if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
                 visited = near & (self._broken() | self._grown(self.changed, 1))
-            points = self.points.copy()
-            for blocks in self.colours:
-                _kernels.relocate(
-                    move, points, visited, self.stars, blocks, self.threshold_sine2, self.min_measure,
-                    self.reach.start, self.reach.distance, self.threads,
-                )  # fmt: skip
-            yield points
+            yield self._relocated(move, visited, threshold)
             visited = near
             if len(phase.moves) == 1:  # elsewhere a second visit finds what the first did
                 visited = near & self._grown(self.changed, 1)
+
+    def _raisings(self, move: Move, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        ceiling = self._min_sine2(self.stuck)
+        smallest, waited = self._min_sine2(self.mendable), 0
+        while smallest < ceiling and waited < RAISE_PATIENCE:
+            yield self._relocated(move, near, _raised(smallest, RAISE))
+            now = self._min_sine2(self.mendable)
+            waited = 0 if now > _raised(smallest, RISE) else waited + 1
+            smallest = max(smallest, now)
+
+    def _relocated(self, move: Move, visited: NDArray[np.bool_], threshold: float) -> NDArray[np.float64]:
+        points = self.points.copy()
+        for blocks in self.colours:
+            _kernels.relocate(
+                move, points, visited, self.stars, blocks, threshold, self.min_measure, self.reach.start,
+                self.reach.distance, self.threads,
+            )  # fmt: skip
+        return points
+
+    def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
+        """Return the smallest sine^2; 1: there are no simplices, 0: one is not valid."""
+        return max(_kernels.min_sine2(self.points, simplices, self.threads), 0.0)
 
     def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         from meshfix_cli.foldover import minimisations
@@ -363,7 +409,7 @@ def collect(run: Iterator[tuple[Mesh, SweepRecord]], threads: int = 1) -> Outcom
     before = untangled = mesh
     records = [record]
     for mesh, record in run:
-        if record.phase != SMOOTHING:
+        if not record.phase.startswith(SMOOTHING):
             untangled = mesh
         records.append(record)
     return Outcome(before, untangled, mesh, tuple(records), obstacles)
@@ -374,7 +420,7 @@ def untangle(
     strategy: str = "auto",
     *,
     sweeps: int | None = None,
-    smooth: int = SMOOTH,
+    smooth: int | Literal["best"] = SMOOTH,
     threshold: float | None = None,
     max_move: float = math.inf,
     only_invalid: bool = False,
@@ -387,8 +433,9 @@ def untangle(
     mesh : Mesh
     strategy : str
         A key of `STRATEGIES`.
-    smooth : int
-        Smoothing passes.
+    smooth : int or "best"
+        Smoothing passes. "best": `SMOOTH` of them, `MEAN_SWEEPS` sweeps that make the mean ratios of all stars better, and
+        sweeps that raise the smallest angle until it is that of the simplices without a free vertex or rises no more.
     sweeps, threshold, max_move, only_invalid
         See `steps`.
     threads : int

@@ -199,6 +199,12 @@ auto check_py(const Matrix<const double>& points, const Matrix<const std::int32_
     return std::make_pair(to_numpy(std::move(total.inverted)), total.min_measure);
 }
 
+double min_sine2_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    return with_dimension(points.shape(1), [&](auto d) {
+        return min_sine2<d>(points.data(), simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), threads);
+    });
+}
+
 auto measure_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
     const std::size_t m = simplices.shape(0);
     std::vector<double> measure(m);
@@ -426,6 +432,7 @@ nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& sp
 NB_MODULE(_kernels, m) {
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "visited"_a.noconvert(), "mesh"_a,
@@ -471,5 +478,5 @@ NB_MODULE(_kernels, m) {
         .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
     m.attr("BLOCK_SIZE") = BLOCK_SIZE;
 
-    static_assert(static_cast<int>(Move::untangle_heights) == 5, "the codes of untangle.Move");
+    static_assert(static_cast<int>(Move::raise_smallest) == 7, "the codes of untangle.Move");
 }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "parallel.hpp"
-#include "simplex.hpp"
+#include "sines.hpp"
 
 namespace meshfix {
 
@@ -107,6 +107,17 @@ Validity check(const double* points, const std::int32_t* simplices, std::int64_t
     }
     total.min_measure /= factorial(D);
     return total;
+}
+
+// The smallest sign(det) * sine^2 of all simplices, -1 where one is not valid.
+template <int D>
+double min_sine2(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
+    std::vector<double> parts(m / PER_ITEM + 1, 1.0);
+    for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
+        const double sine2 = min_sine2(e);
+        if (!(sine2 >= parts[s / PER_ITEM])) parts[s / PER_ITEM] = sine2 > 0.0 ? sine2 : -1.0;
+    });
+    return *std::min_element(parts.begin(), parts.end());
 }
 
 // What a report needs to know. Angles in radians.

@@ -5,15 +5,18 @@
 #include "active_set.hpp"
 #include "laplacian.hpp"
 #include "linear_program.hpp"
+#include "mean_ratio.hpp"
 #include "order.hpp"
 #include "parallel.hpp"
 
 namespace meshfix {
 
-enum class Move : int { laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights };
+enum class Move : int {
+    laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest
+};
 
 struct Parameters {
-    double threshold_sine2;  // combined smoothing: the active-set method runs on stars below it
+    double threshold_sine2;  // the active-set method runs on stars below it; mean_ratio: the floor
     double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
     const double* start;     // (n, D): where the vertices came from
     double max_move;         // how far from there they may be; infinity: anywhere
@@ -87,9 +90,29 @@ struct Relocation {
     bool smooth(std::int64_t v, bool optimise) {
         double quality = min_sine2<D>(star, star.position, 0.0);
         if (!(quality > 0.0)) return false;  // only valid stars are smoothed
+        return take(v, smoothed(quality, optimise));
+    }
+
+    // The active-set method where the star is below the threshold, nothing elsewhere.
+    bool raise_smallest(std::int64_t v) {
+        double quality = min_sine2<D>(star, star.position, 0.0);
+        if (!(quality > 0.0 && quality < parameters.threshold_sine2)) return false;
+        return take(v, smoothed(quality, true));
+    }
+
+    bool smooth_mean(std::int64_t v) {
+        const double quality = min_sine2<D>(star, star.position, 0.0);
+        return quality > 0.0 && take(v, improve_mean<D>(star, quality, parameters.threshold_sine2));
+    }
+
+    Vec<D> smoothed(double quality, bool optimise) {
         Vec<D> x = smart_laplacian(star, quality);
         if (optimise && quality < LP_PINCHED_SINE2) x = smart_programme(x, quality);
         if (optimise && quality < parameters.threshold_sine2) x = active_set.improve(star, x, quality);
+        return x;
+    }
+
+    bool take(std::int64_t v, const Vec<D>& x) {
         return x == star.position || makes_smaller(x) ? false : store(v, star.to_global(x));
     }
 
@@ -129,6 +152,8 @@ struct Relocation {
             case Move::smart_laplacian: counts.moved += smooth(v, false); break;
             case Move::combined_smooth: counts.moved += smooth(v, true); break;
             case Move::untangle_heights: counts.moved += untangle_heights(v); break;
+            case Move::mean_ratio: counts.moved += smooth_mean(v); break;
+            case Move::raise_smallest: counts.moved += raise_smallest(v); break;
             case Move::laplacian: break;
         }
     }

@@ -1,0 +1,157 @@
+// Smoothing of the mean: Newton's method for the sum of the inverse mean ratios of a star, raised to a power that
+// makes bad simplices count more, without lowering its smallest sine below a floor.
+//
+// The inverse mean ratio of a simplex is S / det^(2/D) but for a constant, S the sum of its squared edges; it is
+// smallest where the simplex is regular and goes to infinity where it is flat. The powers, 2 in 2-D and 9/4 in 3-D, take
+// nothing but square roots. Source: P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
+#pragma once
+
+#include "sines.hpp"
+
+namespace meshfix {
+
+constexpr double mean_ratio_power(int d) { return d == 2 ? 2.0 : 2.25; }
+
+template <class T>
+inline T powered_ratio(const Edges<2, T>&, T edges2, T det) {
+    const T ratio = edges2 / det;
+    return ratio * ratio;
+}
+template <class T>
+inline T powered_ratio(const Edges<3, T>&, T edges2, T det) {
+    const T root = square_root(edges2 * edges2 * edges2 / (det * det));
+    return root * square_root(root);
+}
+
+template <int D, class T>
+inline T sum_of_squared_edges(const Edges<D, T>& e) {
+    T sum = constant<T>(0.0);
+    for (int i = 0; i < D; ++i) {
+        sum += norm2(e[i]);
+        for (int j = i + 1; j < D; ++j) sum += norm2(e[j] - e[i]);
+    }
+    return sum;
+}
+
+// The gradient of the determinant by x.
+template <class T>
+inline Vec<2, T> determinant_slope(const Edges<2, T>& e) {
+    return {e[0][1] - e[1][1], e[1][0] - e[0][0]};
+}
+template <class T>
+inline Vec<3, T> determinant_slope(const Edges<3, T>& e) {
+    return cross(e[2] - e[0], e[1] - e[0]);
+}
+
+inline double sum_of_lanes(Pack p) {
+    double sum = 0.0;
+    for (int i = 0; i < LANES; ++i) sum += p[i];
+    return sum;
+}
+
+// 1 for the faces of a block, 0 for what fills up the last one.
+template <int D>
+Pack weights(const Star<D>& star, std::size_t block) {
+    Pack w = constant<Pack>(1.0);
+    for (int i = 0; i < LANES; ++i)
+        if (static_cast<int>(block) * LANES + i >= star.faces_count) w[i] = 0.0;
+    return w;
+}
+
+template <int D>
+struct MeanRatio {
+    double value = 0.0;
+    Vec<D> gradient{};
+    std::array<Vec<D>, D> hessian{};  // its lower triangle
+
+    // The sum over a star at x; infinite where a determinant is not positive.
+    static double at(const Star<D>& star, const Vec<D>& x) {
+        Pack sum = constant<Pack>(0.0), smallest = constant<Pack>(1.0);
+        for (std::size_t b = 0; b < star.blocks.size(); ++b) {
+            const auto e = star.edges(star.blocks[b], x);
+            const Pack det = determinant(e);
+            smallest = smaller(smallest, det);
+            sum += weights(star, b) * powered_ratio(e, sum_of_squared_edges<D>(e), det);
+        }
+        for (int i = 0; i < LANES; ++i)
+            if (!(smallest[i] > 0.0)) return INFINITY;
+        return sum_of_lanes(sum);
+    }
+
+    // With derivatives: f = r^p, log r = log S - 2/D log det.
+    MeanRatio(const Star<D>& star, const Vec<D>& x) {
+        constexpr double p = mean_ratio_power(D);
+        Pack sum = constant<Pack>(0.0);
+        Vec<D, Pack> slope;
+        std::array<Vec<D, Pack>, D> curvature;
+        for (int i = 0; i < D; ++i) {
+            slope[i] = sum;
+            for (int j = 0; j <= i; ++j) curvature[i][j] = sum;
+        }
+        for (std::size_t b = 0; b < star.blocks.size(); ++b) {
+            const auto e = star.edges(star.blocks[b], x);
+            const Pack edges2 = sum_of_squared_edges<D>(e), det = determinant(e);
+            const Pack f = weights(star, b) * powered_ratio(e, edges2, det), pf = p * f;
+            Vec<D, Pack> outward = e[0];
+            for (int k = 1; k < D; ++k) outward = outward + e[k];
+            const Vec<D, Pack> s = (constant<Pack>(-2.0) / edges2) * outward;
+            const Vec<D, Pack> n = (constant<Pack>(1.0) / det) * determinant_slope(e);
+            const Vec<D, Pack> u = s - constant<Pack>(2.0 / D) * n;
+            sum += f;
+            for (int i = 0; i < D; ++i) {
+                slope[i] += pf * u[i];
+                curvature[i][i] += pf * (constant<Pack>(2.0 * D) / edges2);
+                for (int j = 0; j <= i; ++j)
+                    curvature[i][j] += pf * (p * u[i] * u[j] - s[i] * s[j] + 2.0 / D * n[i] * n[j]);
+            }
+        }
+        value = sum_of_lanes(sum);
+        for (int i = 0; i < D; ++i) {
+            gradient[i] = sum_of_lanes(slope[i]);
+            for (int j = 0; j <= i; ++j) hessian[i][j] = sum_of_lanes(curvature[i][j]);
+        }
+    }
+
+    // Newton's step by Cholesky's factors; steepest descent over a tenth of the star where the sum is not convex.
+    Vec<D> step(double radius) const {
+        std::array<Vec<D>, D> l = hessian;
+        for (int i = 0; i < D; ++i)
+            for (int j = 0; j <= i; ++j) {
+                for (int k = 0; k < j; ++k) l[i][j] -= l[i][k] * l[j][k];
+                if (j < i) {
+                    l[i][j] /= l[j][j];
+                } else if (l[i][i] > NEWTON_PIVOT * hessian[i][i]) {
+                    l[i][i] = std::sqrt(l[i][i]);
+                } else {
+                    return (-0.1 * radius / std::sqrt(norm2(gradient))) * gradient;
+                }
+            }
+        Vec<D> x;
+        for (int i = 0; i < D; ++i) {
+            x[i] = -gradient[i];
+            for (int k = 0; k < i; ++k) x[i] -= l[i][k] * x[k];
+            x[i] /= l[i][i];
+        }
+        for (int i = D; i-- > 0;) {
+            for (int k = i + 1; k < D; ++k) x[i] -= l[k][i] * x[k];
+            x[i] /= l[i][i];
+        }
+        return x;
+    }
+};
+
+// From a valid position to one of a smaller sum whose smallest sine^2 is not below the floor, nor, where that of the
+// star is below it, smaller than it was.
+template <int D>
+Vec<D> improve_mean(const Star<D>& star, double quality, double floor) {
+    const MeanRatio<D> here(star, star.position);
+    const double least = std::min(quality, floor) * (1.0 - NEWTON_EQUAL);  // `min_sine2` wants more than its floor
+    Vec<D> step = here.step(star.radius);
+    for (int trial = 0; trial < NEWTON_TRIALS; ++trial, step = 0.5 * step) {
+        const Vec<D> x = star.snap(star.position + step);
+        if (MeanRatio<D>::at(star, x) < here.value && min_sine2<D>(star, x, least) > 0.0) return x;
+    }
+    return star.position;
+}
+
+}  // namespace meshfix

@@ -15,7 +15,7 @@ class Connectivity:
     All of them are views; faces and what follows it are empty until the stars are built.
     """
 
-    def __init__(self, points: Float64, simplices: Int32, threads: int) -> None: ...
+    def __init__(self, points: Float64, simplices: Int32, used: Int32, threads: int) -> None: ...
     def flip(self, flipped: NDArray[np.bool_], threads: int) -> None:
         """Give some simplices (m,) the other orientation."""
 
@@ -24,6 +24,9 @@ class Connectivity:
 
     def grown(self, mask: NDArray[np.bool_], rings: int) -> NDArray[np.uint8]:
         """Mark these vertices (n,) and rings of neighbours."""
+
+    def stuck(self, movable: NDArray[np.bool_], threads: int) -> Int32:
+        """Simplices without a movable vertex."""
 
     def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32]:
         """Facets (f, d) without a movable vertex, each once, and a simplex of each."""
@@ -67,6 +70,9 @@ class Connectivity:
 def check_simplices(simplices: Int32, n: int, threads: int) -> tuple[int, int]:
     """The first row with a number outside 0 .. n-1, and the first that names a vertex twice; -1: none."""
 
+def used_vertices(simplices: Int32, n: int) -> Int32:
+    """Return the vertices of simplices, ascending."""
+
 def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
     """Rows of the inverted simplices, and the smallest signed measure."""
 
@@ -93,7 +99,8 @@ def relocate(
 ) -> tuple[int, int]:
     """Relocate, in place, the vertices to visit (n,) of some blocks of one colour; the numbers visited and moved.
 
-    The threshold is that of the active-set method, or the floor of MEAN_RATIO. Smoothing makes no measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
+    The threshold is that of the active-set method, or the floor of MEAN_RATIO. Smoothing makes no measure smaller than
+    `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
 def linear_program(
@@ -128,8 +135,14 @@ def find_words(data: bytes, offsets: Int64, count: int, one_line: bool) -> Int64
     With one_line, -1 for those that the line does not have; else fewer spans where the data end.
     """
 
-def scan_integers(data: bytes, at: int, count: int) -> tuple[Int64, int, int]:
-    """Values, the offset behind them, and the offset of what is not an integer or -1."""
+def use_threads(threads: int) -> None:
+    """Let the passes over text, from here to the end of this file, take as many threads: 1 at first."""
+
+def behind_words(data: bytes, at: int, count: int) -> int:
+    """Return the offset behind the next words; -1: there are fewer."""
+
+def scan_integers(data: bytes, at: int, count: int) -> tuple[Int32 | Int64, int, int]:
+    """Values, in 32 bits where these do, the offset behind them, and the offset of what is not an integer or -1."""
 
 def integers(data: bytes, spans: Int64, slash: bool) -> tuple[Int64, int]:
     """Values of the words at spans (n, 2), up to a slash if it may be there, and the row of the first bad one or -1."""

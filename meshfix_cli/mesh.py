@@ -45,6 +45,11 @@ class Topology:
     connectivity: _kernels.Connectivity
 
     @property
+    def m(self) -> int:
+        """Number of simplices."""
+        return len(self.source)
+
+    @property
     def dimension(self) -> int:
         """2 for triangles, 3 for tetrahedra."""
         return self.connectivity.simplices.shape[1] - 1
@@ -87,7 +92,16 @@ class Topology:
     @cached_property
     def used(self) -> NDArray[np.bool_]:
         """(n,) bool: the vertices of simplices; other points are isolated."""
-        return self.of_vertices(np.ones(len(self.connectivity.vertices), dtype=bool))
+        mask = np.zeros(self.n, dtype=bool)
+        mask[self.connectivity.vertices] = True
+        return mask
+
+    @cached_property
+    def number(self) -> NDArray[np.int32]:
+        """(n,) int32: the number of each vertex in the connectivity; 0 for isolated points."""
+        numbers = np.zeros(self.n, dtype=np.int32)
+        numbers[self.connectivity.vertices] = np.arange(len(self.connectivity.vertices), dtype=np.int32)
+        return numbers
 
     @cached_property
     def boundary(self) -> NDArray[np.bool_]:
@@ -128,8 +142,9 @@ class Topology:
 
     def of_vertices(self, values: NDArray[_T]) -> NDArray[_T]:
         """Return values (k, ...) of the connectivity's vertices as those of all points (n, ...); 0: isolated."""
-        result = np.zeros((self.n, *values.shape[1:]), dtype=values.dtype)
-        result[self.connectivity.vertices] = values
+        result = np.take(values, self.number, axis=0)
+        if len(values) < self.n:
+            result[~self.used] = 0
         return result
 
     def of_rows(self, values: NDArray[_T]) -> NDArray[_T]:
@@ -188,8 +203,9 @@ class Mesh:
         """
         p = np.array(points, dtype=np.float64, order="C")
         rows = _checked_simplices(p, np.asarray(simplices), threads)
-        _check_coordinates(p, rows)
-        topology = _build_topology(p, rows, threads)
+        used = _kernels.used_vertices(rows, len(p))
+        _check_coordinates(p, used)
+        topology = _build_topology(p, rows, used, threads)
         movable = topology.used & ~topology.boundary
         if fixed is not None:
             movable &= ~np.asarray(fixed, dtype=bool)
@@ -212,7 +228,7 @@ class Mesh:
 
     def along_curve(self, values: NDArray[_T]) -> NDArray[_T]:
         """Return values (n, ...) of the points as those (k, ...) of the connectivity's vertices."""
-        return values[self.topology.connectivity.vertices]
+        return np.take(values, self.topology.connectivity.vertices, axis=0)
 
     def check(self, threads: int = 1) -> tuple[int, float]:
         """Return the number of inverted simplices and the smallest signed area or volume, in model units."""
@@ -220,10 +236,9 @@ class Mesh:
         inverted, smallest = _kernels.check(points, simplices, threads)
         return len(inverted), smallest
 
-    def stuck(self) -> NDArray[np.int32]:
+    def stuck(self, threads: int = 1) -> NDArray[np.int32]:
         """Return the rows of the connectivity's simplices that have no free vertex."""
-        free = self.along_curve(self.movable)[self.topology.connectivity.simplices]
-        return np.flatnonzero(~free.any(axis=1)).astype(np.int32)
+        return self.topology.connectivity.stuck(self.along_curve(self.movable), threads)
 
     def mean_edge_length(self) -> float:
         """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
@@ -264,28 +279,29 @@ def _checked_simplices(
     return rows
 
 
-def _check_coordinates(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> None:
-    used = np.zeros(len(points), dtype=bool)
-    used[simplices] = True
-    infinite = used & ~np.isfinite(points).all(axis=1)
-    if infinite.any():
-        vertex = int(np.argmax(infinite))
+def _check_coordinates(points: NDArray[np.float64], used: NDArray[np.int32]) -> None:
+    corners = np.take(points, used, axis=0)
+    finite = np.isfinite(corners)
+    if not finite.all():
+        vertex = int(used[np.argmin(finite.all(axis=1))])
         raise InvalidMeshError(f"vertex {vertex} has a coordinate that is not finite")
-    low, high = points[used].min(axis=0), points[used].max(axis=0)
+    low, high = corners.min(axis=0), corners.max(axis=0)
     if max(-low.min(), high.max()) > LARGEST_COORDINATE:
         raise InvalidMeshError(f"coordinates beyond {LARGEST_COORDINATE:g} cannot be computed with")
     if (high - low).max() < SMALLEST_SIZE:
         raise InvalidMeshError("all vertices are in one point")
 
 
-def _build_topology(points: NDArray[np.float64], simplices: NDArray[np.int32], threads: int) -> Topology:
+def _build_topology(
+    points: NDArray[np.float64], simplices: NDArray[np.int32], used: NDArray[np.int32], threads: int
+) -> Topology:
     n, d = points.shape
     source = np.arange(len(simplices))
-    mesh = _kernels.Connectivity(points, simplices, threads)
+    mesh = _kernels.Connectivity(points, simplices, used, threads)
     if mesh.crowded >= 0:
         _, first = np.unique(np.sort(simplices, axis=1), axis=0, return_index=True)
         source = np.sort(first)
-        mesh = _kernels.Connectivity(points, np.ascontiguousarray(simplices[source]), threads)
+        mesh = _kernels.Connectivity(points, np.ascontiguousarray(simplices[source]), used, threads)
     if mesh.crowded >= 0:
         row, position = divmod(mesh.crowded, d + 1)
         facet = np.delete(mesh.vertices[mesh.simplices[row]], position).tolist()
@@ -295,7 +311,8 @@ def _build_topology(points: NDArray[np.float64], simplices: NDArray[np.int32], t
     flipped = mesh.against.astype(bool)
     # The signed size of a consistently numbered component depends on its boundary alone, so it tells a mesh that
     # is numbered the other way round from one whose interior is tangled.
-    measure = _kernels.measure(points[mesh.vertices], mesh.simplices, threads)[0] * np.where(flipped, -1.0, 1.0)
+    measure = _kernels.measure(np.take(points, mesh.vertices, axis=0), mesh.simplices, threads)[0]
+    np.negative(measure, out=measure, where=flipped)
     flipped ^= (np.bincount(mesh.component, weights=measure) < 0)[mesh.component]
     if flipped.any():
         mesh.flip(flipped, threads)

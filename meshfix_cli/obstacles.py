@@ -37,7 +37,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     Facets that only touch, as at a slit, do not cross; nor do those of separate parts, which may be in contact.
     """
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
-    rows = mesh.stuck()
+    rows = mesh.stuck(threads)
     inverted, _ = _kernels.check(points, connectivity.simplices[rows], threads)
     facets, owners = connectivity.fixed_facets(mesh.along_curve(mesh.movable), threads)
     pairs = owners[_kernels.crossings(points, facets, threads)]

@@ -179,7 +179,7 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
 
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     """Return the smallest angle among simplices with no free vertex: no method can raise it. None: there are none."""
-    stuck = mesh.topology.connectivity.simplices[mesh.stuck()]
+    stuck = mesh.topology.connectivity.simplices[mesh.stuck(threads)]
     if len(stuck) == 0:
         return None
     return float(np.degrees(_kernels.angles(mesh.along_curve(mesh.points), stuck, threads)[0].min()))

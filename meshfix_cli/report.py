@@ -139,7 +139,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "command": report.command,
         "file": report.name,
         "dimension": mesh.dimension,
-        "elements": len(mesh.topology.simplices),
+        "elements": mesh.topology.m,
         "vertices": int(mesh.topology.used.sum()),
         "free_vertices": int(mesh.movable.sum()),
         "fixed": report.fixed,
@@ -206,7 +206,7 @@ def _title(report: Report) -> str:
     mesh = report.mesh
     cells, held = CELL_NAMES[mesh.dimension][1], ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
     vertices, free = int(mesh.topology.used.sum()), int(mesh.movable.sum())
-    return f"{report.name}: {len(mesh.topology.simplices):,} {cells}, {vertices:,} vertices: {free:,} free" + (
+    return f"{report.name}: {mesh.topology.m:,} {cells}, {vertices:,} vertices: {free:,} free" + (
         f", fixed {held}" if held else ""
     )
 
@@ -302,5 +302,7 @@ def _perturbed(facts: Mapping[str, Any]) -> str:
 
 def _listed(report: Report) -> list[tuple[int, list[float]]]:
     first = report.result.inverted_elements[: report.listed]
+    if not len(first):
+        return []
     centroids = report.points[report.mesh.topology.simplices[first]].mean(axis=1, dtype=np.float64)
     return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]

@@ -240,7 +240,7 @@ def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
     """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
     import numpy as np
 
-    free = np.delete(mesh.topology.connectivity.simplices, mesh.stuck(), axis=0)
+    free = np.delete(mesh.topology.connectivity.simplices, mesh.stuck(threads), axis=0)
     smallest = _kernels.angles(mesh.along_curve(mesh.points), free, threads)[0]
     return bool(smallest.min(initial=math.pi) >= math.radians(degrees))
 
@@ -266,7 +266,7 @@ class _Run:
         self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
         self.reach = Reach(self.points, max_move)
-        stuck = mesh.stuck()
+        stuck = mesh.stuck(threads)
         self.stuck = self.stars.simplices[stuck]
         inverted = _kernels.check(self.points, self.stuck, threads)[0]
         self.mendable = self.stars.simplices
@@ -286,10 +286,13 @@ class _Run:
     @property
     def mesh(self) -> Mesh:
         """The mesh at these positions."""
+        import numpy as np
+
         if self.points is self.first[0]:
             return self.input
-        points = self.input.points.copy()
-        points[self.stars.vertices] = self.points
+        points = self.input.topology.of_vertices(self.points)
+        if len(self.points) < len(points):  # isolated ones stay
+            points = np.where(self.input.topology.used[:, None], points, self.input.points)
         return self.input.with_points(points)
 
     @property
@@ -434,8 +437,8 @@ def untangle(
     strategy : str
         A key of `STRATEGIES`.
     smooth : int or "best"
-        Smoothing passes. "best": `SMOOTH` of them, `MEAN_SWEEPS` sweeps that make the mean ratios of all stars better, and
-        sweeps that raise the smallest angle until it is that of the simplices without a free vertex or rises no more.
+        Smoothing passes. "best": `SMOOTH` of them, `MEAN_SWEEPS` sweeps for the mean ratios of all stars, and sweeps
+        that raise the smallest angle until it is that of the simplices without a free vertex or rises no more.
     sweeps, threshold, max_move, only_invalid
         See `steps`.
     threads : int

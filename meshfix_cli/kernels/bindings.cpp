@@ -5,6 +5,7 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
 
+#include <numeric>
 #include <variant>
 
 #include "crossings.hpp"
@@ -104,11 +105,12 @@ Star<D> make_star(const Matrix<const double>& neighbours, const Matrix<const std
 }
 
 void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
-                       const Matrix<const std::int32_t>& simplices, int threads) {
+                       const Matrix<const std::int32_t>& simplices, const Vector<const std::int32_t>& used, int threads) {
     if (simplices.shape(1) != points.shape(1) + 1) throw nb::value_error("the simplices are of another dimension");
     Connectivity mesh = with_dimension(points.shape(1), [&](auto d) {
         return connect<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
-                          static_cast<std::int64_t>(simplices.shape(0)), threads);
+                          static_cast<std::int64_t>(simplices.shape(0)),
+                          std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
     });
     new (self) PyConnectivity{static_cast<int>(points.shape(1)), std::move(mesh)};
 }
@@ -131,6 +133,13 @@ auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int ri
     return to_numpy(std::move(marked));
 }
 
+auto stuck_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
+    const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
+    return to_numpy(with_dimension(self.dimension, [&](auto d) {
+        return stuck_simplices<d>(self.mesh.simplices.data(), self.mesh.m(), mask, threads);
+    }));
+}
+
 auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
     const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
     FixedFacets found = with_dimension(self.dimension, [&](auto d) {
@@ -147,6 +156,10 @@ auto summarise_py(const PyConnectivity& self, const Matrix<const double>& points
     });
     return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.inverted)), total.folded,
                            total.min_measure, total.largest);
+}
+
+auto used_vertices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
+    return to_numpy(used_vertices(simplices.data(), static_cast<std::int64_t>(simplices.size()), n));
 }
 
 auto check_simplices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
@@ -226,12 +239,13 @@ auto angles_py(const Matrix<const double>& points, const Matrix<const std::int32
     std::vector<double> smallest(m), largest(m);
     with_dimension(points.shape(1), [&](auto dimension) {
         constexpr int D = dimension;
-        for_each_simplex<D>(points.data(), simplices.data(), static_cast<std::int64_t>(m), threads,
-                            [&](std::int64_t s, const Edges<D>& e) {
-                                const ExtremeAngles extreme = angles(e);
-                                smallest[s] = extreme.smallest();
-                                largest[s] = extreme.largest();
-                            });
+        for_each_range(static_cast<std::int64_t>(m), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for_each_angles<D>(points.data(), simplices.data(), begin, end,
+                               [&](std::int64_t s, const Edges<D>&, AngleRange range) {
+                                   smallest[s] = range.smallest;
+                                   largest[s] = range.largest;
+                               });
+        });
     });
     return std::make_pair(to_numpy(std::move(smallest)), to_numpy(std::move(largest)));
 }
@@ -347,6 +361,7 @@ std::string_view word_at(std::string_view text, const std::int64_t* span) {
 auto find_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t count,
                    bool one_line) {
     const std::string_view text = view_of(data);
+    if (!one_line && offsets.shape(0) == 1) return to_numpy(find_words(text, offsets(0), count, text_threads), 2);
     std::vector<std::int64_t> spans;
     for (std::size_t i = 0; i < offsets.shape(0); ++i) {
         Span word{offsets(i), offsets(i)};
@@ -359,33 +374,37 @@ auto find_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offs
     return to_numpy(std::move(spans), 2);
 }
 
-auto scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
-    const std::string_view text = view_of(data);
-    std::vector<std::int64_t> values;
-    std::int64_t bad = -1;
-    for (std::int64_t value = 0; static_cast<std::int64_t>(values.size()) < count; values.push_back(value)) {
-        const Span word = next_word(text, at, false);
-        const std::int64_t span[2] = {word.begin, word.end};
-        if (word.begin < 0 || !read_integer(word_at(text, span), value, false)) {
-            bad = word.begin < 0 ? static_cast<std::int64_t>(text.size()) : word.begin;
-            break;
-        }
-        at = word.end;
-    }
-    return std::make_tuple(to_numpy(std::move(values)), at, bad);
+std::int64_t behind_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    return behind_words(view_of(data), at, count, text_threads);
+}
+
+template <class T>
+nb::tuple integers_of(Integers<T>&& read) {
+    return nb::make_tuple(to_numpy(std::move(read.values)), read.end, read.bad);
+}
+
+// In 32 bits where that is enough.
+nb::tuple scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    auto read = read_integers<std::int32_t>(view_of(data), at, count, text_threads);
+    if (read.fit) return integers_of(std::move(read));
+    return integers_of(read_integers<std::int64_t>(view_of(data), at, count, text_threads));
 }
 
 template <class Real, class Value, class Read>
 auto read_words(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const Read& read) {
     const std::string_view text = view_of(data);
+    const auto count = static_cast<std::int64_t>(spans.shape(0));
     std::vector<Value> values(spans.shape(0));
-    std::int64_t bad = -1;
-    for (std::size_t i = 0; i < values.size() && bad < 0; ++i) {
-        Real value{};
-        if (!read(word_at(text, spans.data() + 2 * i), value)) bad = static_cast<std::int64_t>(i);
-        values[i] = static_cast<Value>(value);
-    }
-    return std::make_pair(to_numpy(std::move(values)), bad);
+    std::vector<std::int64_t> bad(count / PER_ITEM + 1, -1);
+    for_each_range(count, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t i = begin; i < end && bad[item] < 0; ++i) {
+            Real value{};
+            if (!read(word_at(text, spans.data() + 2 * i), value)) bad[item] = i;
+            values[i] = static_cast<Value>(value);
+        }
+    });
+    const auto first = std::find_if(bad.begin(), bad.end(), [](std::int64_t row) { return row >= 0; });
+    return std::make_pair(to_numpy(std::move(values)), first == bad.end() ? -1 : *first);
 }
 
 auto integers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, bool slash) {
@@ -399,38 +418,62 @@ auto numbers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, 
 }
 
 auto shortest_py(const Vector<const double>& values, bool single, int longest) {
+    const auto count = static_cast<std::int64_t>(values.shape(0));
+    std::vector<std::string> parts(count / PER_ITEM + 1);
+    std::vector<std::int64_t> spans(2 * count);
+    for_each_range(count, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t i = begin; i < end; ++i) {
+            spans[2 * i] = static_cast<std::int64_t>(parts[item].size());
+            parts[item] += single ? shortest(static_cast<float>(values(i)), longest) : shortest(values(i), longest);
+            spans[2 * i + 1] = static_cast<std::int64_t>(parts[item].size());
+        }
+    });
     std::string words;
-    std::vector<std::int64_t> spans;
-    for (std::size_t i = 0; i < values.shape(0); ++i) {
-        spans.push_back(static_cast<std::int64_t>(words.size()));
-        words += single ? shortest(static_cast<float>(values(i)), longest) : shortest(values(i), longest);
-        spans.push_back(static_cast<std::int64_t>(words.size()));
+    for (std::size_t item = 0; item < parts.size(); ++item) {
+        const std::int64_t end = std::min<std::int64_t>(count, (item + 1) * PER_ITEM);
+        for (std::int64_t i = 2 * item * PER_ITEM; i < 2 * end; ++i) spans[i] += static_cast<std::int64_t>(words.size());
+        words += parts[item];
     }
     return std::make_pair(nb::bytes(words.data(), words.size()), to_numpy(std::move(spans), 2));
 }
 
+// A span that is not in the text counts as empty, and so where it is put.
 nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const nb::bytes& words,
                      const Matrix<const std::int64_t>& word_spans) {
     const std::string_view text = view_of(data), replacements = view_of(words);
-    std::string out;
-    out.reserve(text.size() + replacements.size());
-    std::int64_t done = 0;
-    for (std::size_t i = 0; i < spans.shape(0); ++i) {
-        const std::int64_t* span = spans.data() + 2 * i;
-        const std::int64_t before[2] = {done, span[0]};
-        if (span[0] < done) throw nb::value_error("the spans overlap or are not in order");
-        out += word_at(text, before);
-        out += word_at(replacements, word_spans.data() + 2 * i);
-        done = span[1];
+    const auto count = static_cast<std::int64_t>(spans.shape(0));
+    const auto word = [&](std::int64_t i) { return word_at(replacements, word_spans.data() + 2 * i); };
+    const auto before = [&](std::int64_t i) {  // what stays in front of span i; of `count`, what is left
+        const std::int64_t kept[2] = {i > 0 ? spans(i - 1, 1) : 0,
+                                      i < count ? spans(i, 0) : static_cast<std::int64_t>(text.size())};
+        return word_at(text, kept);
+    };
+    std::vector<std::int64_t> starts(count / PER_ITEM + 2, 0);  // where in the result each item begins
+    for (std::int64_t i = 0; i < count; ++i) {
+        if (spans(i, 0) < (i > 0 ? spans(i - 1, 1) : 0)) throw nb::value_error("the spans overlap or are not in order");
+        starts[i / PER_ITEM + 1] += static_cast<std::int64_t>(before(i).size() + word(i).size());
     }
-    out += text.substr(static_cast<std::size_t>(done));
-    return nb::bytes(out.data(), out.size());
+    starts.back() += static_cast<std::int64_t>(before(count).size());
+    std::partial_sum(starts.begin(), starts.end(), starts.begin());
+    auto result = nb::steal<nb::bytes>(PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(starts.back())));
+    if (!result.is_valid()) nb::raise_python_error();
+    char* out = PyBytes_AsString(result.ptr());
+    for_each_range(count + 1, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        char* to = out + starts[item];
+        const auto put = [&to](std::string_view part) { to = std::copy(part.begin(), part.end(), to); };
+        for (std::int64_t i = begin; i < end; ++i) {
+            put(before(i));
+            if (i < count) put(word(i));
+        }
+    });
+    return result;
 }
 
 }  // namespace
 
 NB_MODULE(_kernels, m) {
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
+    m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
@@ -443,6 +486,8 @@ NB_MODULE(_kernels, m) {
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
+    m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
+    m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);
     m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
     m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert(), "slash"_a);
     m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
@@ -455,10 +500,12 @@ NB_MODULE(_kernels, m) {
              "threads"_a);
 
     nb::class_<PyConnectivity>(m, "Connectivity")
-        .def("__init__", &init_connectivity, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a)
+        .def("__init__", &init_connectivity, "points"_a.noconvert(), "simplices"_a.noconvert(), "used"_a.noconvert(),
+             "threads"_a)
         .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
         .def("build_stars", &build_stars_py, "threads"_a)
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
+        .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)
         .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a)
         .def("summarise", &summarise_py, "points"_a.noconvert(), "threads"_a)
         .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })

@@ -19,18 +19,25 @@ template <int D>
 int side(const std::array<Vec<D>, D + 1>& p) {
     Edges<D> e;
     for (int k = 0; k < D; ++k) e[k] = p[k + 1] - p[0];
-    const double det = determinant(e), longest2 = longest_edge2<D>(e);
-    const double doubt = CROSSING * (D == 2 ? longest2 : longest2 * std::sqrt(longest2));
-    return det > doubt ? 1 : det < -doubt ? -1 : 0;
+    const double det = determinant(e);
+    const auto is_doubtful = [&](double longest2) {
+        const double size2 = D == 2 ? longest2 * longest2 : longest2 * longest2 * longest2;
+        return !(det * det > CROSSING * CROSSING * size2);
+    };
+    double longest2 = norm2(e[0]);
+    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
+    // The other edges are at most twice as long: only where that matters are they looked at.
+    if (is_doubtful(longest2)) return 0;
+    if (is_doubtful(4.0 * longest2) && is_doubtful(longest_edge2<D>(e))) return 0;
+    return det > 0.0 ? 1 : -1;
 }
 
 inline bool cross_each_other(const Vec<2>& a, const Vec<2>& b, const Vec<2>& c, const Vec<2>& d) {
     return side<2>({a, b, c}) * side<2>({a, b, d}) < 0 && side<2>({c, d, a}) * side<2>({c, d, b}) < 0;
 }
 
-// Whether the segment pq goes through the inside of the triangle.
+// Whether the segment pq, whose ends are on both sides of the triangle's plane, goes through its inside.
 inline bool pierces(const Vec<3>& p, const Vec<3>& q, const std::array<Vec<3>, 3>& t) {
-    if (side<3>({p, t[0], t[1], t[2]}) * side<3>({q, t[0], t[1], t[2]}) >= 0) return false;
     const int first = side<3>({p, q, t[0], t[1]});
     return first != 0 && first == side<3>({p, q, t[1], t[2]}) && first == side<3>({p, q, t[2], t[0]});
 }
@@ -142,16 +149,20 @@ class Crossings {
             if (shares(b, facets_[a * 2]) || shares(b, facets_[a * 2 + 1])) return false;
             return cross_each_other(vertex(a, 0), vertex(a, 1), vertex(b, 0), vertex(b, 1));
         } else {
-            return any_edge_pierces(a, b) || any_edge_pierces(b, a);
+            int shared = 0;
+            for (int k = 0; k < 3; ++k) shared += shares(b, facets_[a * 3 + k]);
+            return shared < 2 && (any_edge_pierces(a, b) || any_edge_pierces(b, a));
         }
     }
 
     bool any_edge_pierces(std::int32_t a, std::int32_t b) const {
         const std::array<Vec<3>, 3> triangle{vertex(b, 0), vertex(b, 1), vertex(b, 2)};
+        std::array<int, 3> sides;  // 0 for a vertex that the two share: its edges do not cross
+        for (int k = 0; k < 3; ++k)
+            sides[k] = shares(b, facets_[a * 3 + k]) ? 0 : side<3>({vertex(a, k), triangle[0], triangle[1], triangle[2]});
         for (int k = 0; k < 3; ++k) {
             const int next = (k + 1) % 3;
-            if (shares(b, facets_[a * 3 + k]) || shares(b, facets_[a * 3 + next])) continue;
-            if (pierces(vertex(a, k), vertex(a, next), triangle)) return true;
+            if (sides[k] * sides[next] < 0 && pierces(vertex(a, k), vertex(a, next), triangle)) return true;
         }
         return false;
     }

@@ -56,64 +56,96 @@ Incidence incidence(const std::int32_t* simplices, std::int64_t m, std::int64_t 
     return csr;
 }
 
-// Whether sorting the vertices of the facet opposite `corner` takes an odd number of swaps.
-// Two consistently numbered simplices see their common facet from opposite sides: one odd, one even.
-template <int D>
-bool is_odd(const std::int32_t* simplices, std::int64_t corner) {
-    const std::int32_t* simplex = simplices + corner / (D + 1) * (D + 1);
-    const auto& face = opposite_face<D>(static_cast<int>(corner % (D + 1)));
-    bool odd = false;
-    for (int i = 0; i < D; ++i)
-        for (int j = i + 1; j < D; ++j) odd ^= simplex[face[i]] > simplex[face[j]];
-    return odd;
-}
-
 struct Facets {
     std::vector<std::int32_t> mates;
-    std::int64_t crowded = -1;  // a corner whose facet has three simplices, or two that are the same; -1: none
+    std::vector<std::uint8_t> against;  // (m, D+1) 1: the two simplices at the facet are numbered against each other
+    std::int64_t crowded = -1;          // a corner whose facet has three simplices, or two that are the same; -1: none
 };
+
+// Calls f(key, position, odd) for the facets of a simplex whose smallest vertex is the one at `here`: the key holds the
+// other vertices, the facet is opposite a position; odd: sorting it, as its simplex sees it, takes an odd number of
+// swaps. Two simplices that are numbered consistently see their facet from opposite sides: one odd, one even.
+template <class F>
+void for_each_facet_at(const std::int32_t* simplex, int here, std::integral_constant<int, 2>, const F& f) {
+    const auto& [a, b] = opposite_face<2>(here);  // (here, a, b) is an even permutation
+    if (simplex[a] > simplex[here]) f(static_cast<std::uint64_t>(simplex[a]), b, false);
+    if (simplex[b] > simplex[here]) f(static_cast<std::uint64_t>(simplex[b]), a, true);
+}
+template <class F>
+void for_each_facet_at(const std::int32_t* simplex, int here, std::integral_constant<int, 3>, const F& f) {
+    const auto& face = opposite_face<3>(here);
+    const std::array<std::int32_t, 3> u{simplex[face[0]], simplex[face[1]], simplex[face[2]]};
+    const std::array<bool, 3> above{u[0] > simplex[here], u[1] > simplex[here], u[2] > simplex[here]};
+    const auto add = [&](int k) {
+        const std::int32_t x = u[(k + 1) % 3], y = u[(k + 2) % 3];
+        f(static_cast<std::uint64_t>(std::min(x, y)) << 32 | static_cast<std::uint64_t>(std::max(x, y)), face[k], x > y);
+    };
+    const int count = above[0] + above[1] + above[2];
+    if (count == 3) {
+        for (int k = 0; k < 3; ++k) add(k);
+    } else if (count == 2) {
+        add(!above[0] ? 0 : !above[1] ? 1 : 2);
+    }
+}
 
 // Each facet is matched at its smallest vertex.
 template <int D>
 Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Incidence& csr, int threads) {
     constexpr std::int64_t VERTICES = 1024;
+    struct Seen {
+        std::int32_t corner;  // -1: it has a mate
+        bool odd;
+    };
     const auto n = static_cast<std::int64_t>(csr.offsets.size()) - 1;
     Facets facets;
     facets.mates.assign(m * (D + 1), -1);
+    facets.against.assign(m * (D + 1), 0);
     std::vector<std::int64_t> crowded(n / VERTICES + 1, -1);
     for_each_range(n, VERTICES, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        thread_local SmallMap<std::uint64_t> at_vertex;  // the corner opposite a facet, by the facet's other vertices
+        thread_local SmallMap<Seen> at_vertex;
         for (std::int64_t v = begin; v < end; ++v) {
             at_vertex.clear(static_cast<std::size_t>(D) * (csr.offsets[v + 1] - csr.offsets[v]));
             for (std::int32_t i = csr.offsets[v]; i < csr.offsets[v + 1]; ++i) {
-                const std::int32_t here = csr.corners[i] % (D + 1), first = csr.corners[i] - here;
-                const std::int32_t* simplex = simplices + first;
-                for (int j = 0; j <= D; ++j) {
-                    if (j == here) continue;
-                    std::uint64_t low = ~std::uint64_t{0}, high = 0;
-                    for (int k = 0; k <= D; ++k) {
-                        if (k == here || k == j) continue;
-                        low = std::min<std::uint64_t>(low, simplex[k]);
-                        high = std::max<std::uint64_t>(high, simplex[k]);
-                    }
-                    if (low < static_cast<std::uint64_t>(v)) continue;
+                const int here = csr.corners[i] % (D + 1);
+                const std::int32_t first = csr.corners[i] - here;
+                for_each_facet_at(simplices + first, here, std::integral_constant<int, D>{},
+                                  [&](std::uint64_t key, int position, bool odd) {
+                    const std::int32_t corner = first + position;
                     bool is_new = false;
-                    std::int32_t& other = at_vertex.find(low << 32 | high, first + j, is_new);
-                    if (is_new) continue;
-                    if (other < 0 || simplices[other] == simplices[first + j]) {
-                        crowded[item] = first + j;
+                    Seen& other = at_vertex.find(key, {corner, odd}, is_new);
+                    if (is_new) return;
+                    if (other.corner < 0 || simplices[other.corner] == simplices[corner]) {
+                        crowded[item] = corner;
                         return;
                     }
-                    facets.mates[other] = first + j;
-                    facets.mates[first + j] = other;
-                    other = -1;
-                }
+                    facets.mates[other.corner] = corner;
+                    facets.mates[corner] = other.corner;
+                    facets.against[other.corner] = facets.against[corner] = odd == other.odd;
+                    other.corner = -1;
+                });
             }
         }
     });
     for (std::int64_t corner : crowded)
         if (facets.crowded < 0) facets.crowded = corner;
     return facets;
+}
+
+// Simplices all of whose vertices are fixed.
+template <int D>
+std::vector<std::int32_t> stuck_simplices(const std::int32_t* simplices, std::int64_t m, const std::uint8_t* movable,
+                                          int threads) {
+    std::vector<std::vector<std::int32_t>> parts(m / PER_ITEM + 1);
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t s = begin; s < end; ++s) {
+            int free = 0;
+            for (int k = 0; k <= D; ++k) free += movable[simplices[s * (D + 1) + k]];
+            if (free == 0) parts[item].push_back(static_cast<std::int32_t>(s));
+        }
+    });
+    std::vector<std::int32_t> found;
+    for (const auto& part : parts) found.insert(found.end(), part.begin(), part.end());
+    return found;
 }
 
 // Facets all of whose vertices are fixed, each once, with the simplex that has it, or the first of two.
@@ -211,15 +243,14 @@ class Union {
 
 // Each item joins the simplices inside a range; what joins ranges comes last.
 template <int D>
-Orientation orient(const std::int32_t* simplices, const std::int32_t* mates, std::int64_t m, int threads) {
+Orientation orient(const Facets& facets, std::int64_t m, int threads) {
     constexpr std::int64_t RANGE = 65536;
     Union sets(m);
     std::atomic<bool> orientable{true};
     std::vector<std::vector<std::int32_t>> later(m / RANGE + 1);  // corners whose mates are in another range
+    const auto& mates = facets.mates;
     const auto join = [&](std::int32_t corner) {
-        const std::int32_t mate = mates[corner];
-        const bool against = is_odd<D>(simplices, corner) == is_odd<D>(simplices, mate);
-        if (!sets.join(corner / (D + 1), mate / (D + 1), against)) orientable = false;
+        if (!sets.join(corner / (D + 1), mates[corner] / (D + 1), facets.against[corner] != 0)) orientable = false;
     };
     for_each_range(m, RANGE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
         for (auto c = static_cast<std::int32_t>(begin * (D + 1)); c < end * (D + 1); ++c) {

@@ -20,61 +20,93 @@ Edges<D> edges_of(const double* points, const std::int32_t* simplex) {
     return e;
 }
 
-// The extreme cosines with their sines: acos alone loses half the digits near 0 and 180 degrees.
-struct ExtremeAngles {
-    double largest_cosine = -2.0, sine_there = 0.0, smallest_cosine = 2.0, sine_here = 0.0;
-
-    void add(double cosine, double sine) {
-        if (cosine > largest_cosine) largest_cosine = cosine, sine_there = sine;
-        if (cosine < smallest_cosine) smallest_cosine = cosine, sine_here = sine;
-    }
-    double smallest() const { return std::atan2(sine_there, largest_cosine); }
-    double largest() const { return std::atan2(sine_here, smallest_cosine); }
-    bool wider_than(const ExtremeAngles& other) const {
-        return smallest_cosine != other.smallest_cosine ? smallest_cosine < other.smallest_cosine
-                                                        : sine_here < other.sine_here;
-    }
-};
-
-// Those of a simplex that has an edge or triangle of size zero.
-inline ExtremeAngles no_angles() { return {1.0, 0.0, -1.0, 0.0}; }
-
-inline ExtremeAngles angles(const Edges<2>& e) {
-    const std::array<Vec<2>, 3> sides{e[0], e[1] - e[0], Vec<2>{} - e[1]};
-    const double area = std::fabs(determinant(e));
-    ExtremeAngles extreme;
-    for (int i = 0; i < 3; ++i) {
-        const Vec<2>&p = sides[i], &q = sides[(i + 2) % 3];
-        const double product = std::sqrt(norm2(p)) * std::sqrt(norm2(q));
-        if (!(product > 0.0)) return no_angles();
-        extreme.add(-dot(p, q) / product, area / product);
-    }
-    return extreme;
+// The cosines of the angles; NaN, or beyond 1, where an edge or triangle has no size.
+template <class T>
+std::array<T, 3> cosines(const Edges<2, T>& e) {
+    const std::array<Vec<2, T>, 3> sides{e[0], e[1] - e[0], constant<T>(-1.0) * e[1]};
+    std::array<T, 3> inverse;
+    for (int i = 0; i < 3; ++i) inverse[i] = constant<T>(1.0) / square_root(norm2(sides[i]));
+    std::array<T, 3> result;
+    for (int i = 0; i < 3; ++i)
+        result[i] = constant<T>(-1.0) * dot(sides[i], sides[(i + 2) % 3]) * inverse[i] * inverse[(i + 2) % 3];
+    return result;
 }
 
-inline ExtremeAngles angles(const Edges<3>& e) {
-    const Vec<3>&A = e[0], &B = e[1], &C = e[2];
-    // Outward normals of the faces opposite the vertices 0 to 3, or all inward.
-    const std::array<Vec<3>, 4> normals{cross(B - A, C - A), cross(C, B), cross(A, C), cross(B, A)};
-    const double volume = std::fabs(determinant(e));
-    std::array<double, 4> lengths;
-    for (int i = 0; i < 4; ++i) {
-        lengths[i] = std::sqrt(norm2(normals[i]));
-        if (!(lengths[i] > 0.0)) return no_angles();
+// Outward normals of the faces opposite the vertices 0 to 3, or all inward; the edge between faces i and j joins
+// the two other vertices.
+template <class T>
+std::array<Vec<3, T>, 4> normals(const Edges<3, T>& e) {
+    const Vec<3, T>&A = e[0], &B = e[1], &C = e[2];
+    return {cross(B - A, C - A), cross(C, B), cross(A, C), cross(B, A)};
+}
+constexpr std::array<std::array<int, 2>, 6> FACES_AT_EDGE{{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
+
+template <class T>
+std::array<T, 6> cosines(const Edges<3, T>& e) {
+    const auto n = normals(e);
+    std::array<T, 4> inverse;
+    for (int i = 0; i < 4; ++i) inverse[i] = constant<T>(1.0) / square_root(norm2(n[i]));
+    std::array<T, 6> result;
+    for (int k = 0; k < 6; ++k) {
+        const auto [i, j] = FACES_AT_EDGE[k];
+        result[k] = constant<T>(-1.0) * dot(n[i], n[j]) * inverse[i] * inverse[j];
     }
-    // The edge between the faces opposite i and j joins the two other vertices.
-    ExtremeAngles extreme;
-    const auto add = [&](int i, int j, const Vec<3>& edge) {
-        const double product = lengths[i] * lengths[j];
-        extreme.add(-dot(normals[i], normals[j]) / product, volume * std::sqrt(norm2(edge)) / product);
+    return result;
+}
+
+// The sine of one of these angles.
+inline double sine_of(const Edges<2>& e, std::size_t i) {
+    const std::array<Vec<2>, 3> sides{e[0], e[1] - e[0], -1.0 * e[1]};
+    return std::fabs(determinant(e)) / (std::sqrt(norm2(sides[i])) * std::sqrt(norm2(sides[(i + 2) % 3])));
+}
+inline double sine_of(const Edges<3>& e, std::size_t k) {
+    const auto n = normals(e);
+    const auto [i, j] = FACES_AT_EDGE[k];
+    const std::array<Vec<3>, 6> along{e[2] - e[1], e[2] - e[0], e[1] - e[0], e[2], e[1], e[0]};
+    return std::fabs(determinant(e)) * std::sqrt(norm2(along[k])) / (std::sqrt(norm2(n[i])) * std::sqrt(norm2(n[j])));
+}
+
+// Smallest and largest angle, with atan2 of sine and cosine: acos alone loses half the digits near 0 and 180 degrees.
+struct AngleRange {
+    double smallest, largest;
+};
+
+template <int D>
+AngleRange angles(const Edges<D>& e) {
+    const auto c = cosines(e);
+    for (double x : c)
+        if (!(std::fabs(x) < 2.0)) return {0.0, std::acos(-1.0)};  // an edge or triangle of size zero
+    const auto at = [&](auto found) {
+        return std::atan2(sine_of(e, static_cast<std::size_t>(found - c.begin())), *found);
     };
-    add(0, 1, C - B);
-    add(0, 2, C - A);
-    add(0, 3, B - A);
-    add(1, 2, C);
-    add(1, 3, B);
-    add(2, 3, A);
-    return extreme;
+    return {at(std::max_element(c.begin(), c.end())), at(std::min_element(c.begin(), c.end()))};
+}
+
+// Calls f(s, edges, range of angles) for the simplices from `begin` to `end`, LANES at a time, by acos where it is exact.
+template <int D, class F>
+void for_each_angles(const double* points, const std::int32_t* simplices, std::int64_t begin, std::int64_t end,
+                     const F& f) {
+    constexpr double FAR_FROM_ONE = 0.95;
+    for (std::int64_t s = begin; s < end; s += LANES) {
+        std::array<Edges<D>, LANES> e;
+        Edges<D, Pack> lanes;
+        for (int i = 0; i < LANES; ++i) {
+            e[i] = edges_of<D>(points, simplices + std::min(s + i, end - 1) * (D + 1));
+            for (int k = 0; k < D; ++k)
+                for (int x = 0; x < D; ++x) lanes[k][x][i] = e[i][k][x];
+        }
+        const auto c = cosines(lanes);
+        Pack largest = c[0], smallest = c[0], sum = constant<Pack>(0.0);
+        for (const Pack& x : c) {
+            largest = larger(largest, x);
+            smallest = smaller(smallest, x);
+            sum += x;  // NaN where one is
+        }
+        for (int i = 0; i < std::min<std::int64_t>(LANES, end - s); ++i) {
+            const bool exact = largest[i] < FAR_FROM_ONE && smallest[i] > -FAR_FROM_ONE && sum[i] == sum[i];
+            f(s + i, e[i], exact ? AngleRange{std::acos(largest[i]), std::acos(smallest[i])} : angles<D>(e[i]));
+        }
+    }
 }
 
 // Calls f(s, edges) for every simplex.
@@ -97,7 +129,7 @@ Validity check(const double* points, const std::int32_t* simplices, std::int64_t
     for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
         Validity& part = parts[s / PER_ITEM];
         const double det = determinant(e);
-        if (!is_valid<D>(det, longest_edge2<D>(e))) part.inverted.push_back(static_cast<std::int32_t>(s));
+        if (!is_valid<D>(e, det)) part.inverted.push_back(static_cast<std::int32_t>(s));
         part.min_measure = std::min(part.min_measure, det);
     });
     Validity total;
@@ -134,36 +166,35 @@ Summary summarise(const double* points, const std::int32_t* simplices, const std
     struct Part {
         std::vector<std::int32_t> inverted;
         std::int64_t folded = 0;
-        double min_det = INFINITY;
-        ExtremeAngles widest;
+        double min_det = INFINITY, largest = 0.0;
     };
     Summary total;
     total.smallest.resize(m);
     std::vector<std::int8_t> sign(m);
     std::vector<Part> parts(m / PER_ITEM + 1);
-    for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
-        Part& part = parts[s / PER_ITEM];
-        const double det = determinant(e);
-        if (!is_valid<D>(det, longest_edge2<D>(e))) part.inverted.push_back(static_cast<std::int32_t>(s));
-        part.min_det = std::min(part.min_det, det);
-        sign[s] = static_cast<std::int8_t>((det > 0.0) - (det < 0.0));
-        const ExtremeAngles extreme = angles(e);
-        total.smallest[s] = extreme.smallest();
-        if (extreme.wider_than(part.widest)) part.widest = extreme;
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        Part part;
+        for_each_angles<D>(points, simplices, begin, end, [&](std::int64_t s, const Edges<D>& e, AngleRange range) {
+            const double det = determinant(e);
+            if (!is_valid<D>(e, det)) part.inverted.push_back(static_cast<std::int32_t>(s));
+            part.min_det = std::min(part.min_det, det);
+            sign[s] = static_cast<std::int8_t>((det > 0.0) - (det < 0.0));
+            total.smallest[s] = range.smallest;
+            part.largest = std::max(part.largest, range.largest);
+        });
+        parts[item] = std::move(part);
     });
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
         for (std::int64_t c = begin * (D + 1); c < end * (D + 1); ++c)
             parts[item].folded += mates[c] > c && sign[c / (D + 1)] * sign[mates[c] / (D + 1)] < 0;
     });
-    ExtremeAngles widest;
     for (const auto& part : parts) {
         total.inverted.insert(total.inverted.end(), part.inverted.begin(), part.inverted.end());
         total.folded += part.folded;
         total.min_measure = std::min(total.min_measure, part.min_det);
-        if (part.widest.wider_than(widest)) widest = part.widest;
+        total.largest = std::max(total.largest, part.largest);
     }
     total.min_measure /= factorial(D);
-    total.largest = widest.largest();
     return total;
 }
 

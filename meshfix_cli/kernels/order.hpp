@@ -154,13 +154,23 @@ struct Order {
     std::vector<std::int32_t> simplices;  // (m, D+1) in the new numbers
 };
 
-template <int D>
-Order order_mesh(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m, int threads) {
-    Order order;
-    std::vector<std::int32_t> number(n, -1);
-    for (std::int64_t c = 0; c < m * (D + 1); ++c) number[simplices[c]] = 0;
+// The vertices of simplices, ascending.
+inline std::vector<std::int32_t> used_vertices(const std::int32_t* simplices, std::int64_t corners, std::int64_t n) {
+    std::vector<std::uint8_t> is_used(n, 0);
+    for (std::int64_t c = 0; c < corners; ++c) is_used[simplices[c]] = 1;
+    std::vector<std::int32_t> used;
     for (std::int64_t v = 0; v < n; ++v)
-        if (number[v] == 0) order.vertices.push_back(static_cast<std::int32_t>(v));
+        if (is_used[v]) used.push_back(static_cast<std::int32_t>(v));
+    return used;
+}
+
+// `used` are the vertices of the simplices, ascending.
+template <int D>
+Order order_mesh(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
+                 std::vector<std::int32_t> used, int threads) {
+    Order order;
+    order.vertices = std::move(used);
+    std::vector<std::int32_t> number(n);
     sort_along_curve<D>(order.vertices, points, threads);
     for (std::size_t i = 0; i < order.vertices.size(); ++i) number[order.vertices[i]] = static_cast<std::int32_t>(i);
 

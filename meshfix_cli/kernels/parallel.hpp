@@ -114,4 +114,7 @@ void for_each_range(std::int64_t count, std::int64_t size, int threads, const Wo
     });
 }
 
+// How many threads the passes over the text of files may take.
+inline std::atomic<int> text_threads{1};
+
 }  // namespace meshfix

@@ -41,6 +41,15 @@ inline auto is_valid(T det, T longest2) {
     return (det > constant<T>(0.0)) & (det * det > constant<T>(VALID * VALID) * measure2);
 }
 
+// The same for one simplex. Where its edges from one vertex tell already, the others are not looked at: they are at
+// most twice as long.
+template <int D>
+inline bool is_valid(const Edges<D>& e, double det) {
+    double longest2 = norm2(e[0]);
+    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
+    return is_valid<D>(det, 4.0 * longest2) || is_valid<D>(det, longest_edge2<D>(e));
+}
+
 // Positions in a simplex of the face opposite corner k, ordered so that (k, face) is an even permutation:
 // det(face - x) is then the determinant of the simplex with x at corner k.
 template <int D>

@@ -33,9 +33,10 @@ struct Connectivity {
 };
 
 template <int D>
-Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m, int threads) {
+Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
+                     std::vector<std::int32_t> used, int threads) {
     Connectivity mesh;
-    Order order = order_mesh<D>(points, n, simplices, m, threads);
+    Order order = order_mesh<D>(points, n, simplices, m, std::move(used), threads);
     mesh.vertices = std::move(order.vertices);
     mesh.rows = std::move(order.rows);
     mesh.simplices = std::move(order.simplices);
@@ -45,8 +46,8 @@ Connectivity connect(const double* points, std::int64_t n, const std::int32_t* s
     if (mesh.crowded >= 0) return mesh;
     mesh.offsets = std::move(csr.offsets);
     mesh.corners = std::move(csr.corners);
+    Orientation orientation = orient<D>(facets, m, threads);
     mesh.mates = std::move(facets.mates);
-    Orientation orientation = orient<D>(mesh.simplices.data(), mesh.mates.data(), m, threads);
     mesh.component = std::move(orientation.component);
     mesh.against = std::move(orientation.against);
     mesh.orientable = orientation.orientable;
@@ -81,22 +82,25 @@ void build_neighbours(Connectivity& mesh, int threads) {
     mesh.neighbour_offsets.assign(mesh.n() + 1, 0);
     std::vector<std::vector<std::int32_t>> found(mesh.blocks());
     for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
-        thread_local SmallMap<std::uint32_t> positions;
+        thread_local std::vector<std::uint32_t> place;  // where a vertex may be in `neighbours`: it is if it is found there
+        place.resize(std::max<std::size_t>(place.size(), mesh.n()));
         auto& neighbours = found[block];
+        neighbours.reserve(20 * (end - begin));
         for (std::int64_t v = begin; v < end; ++v) {
             const std::size_t row = neighbours.size();
-            positions.clear(static_cast<std::size_t>(D) * (mesh.offsets[v + 1] - mesh.offsets[v]));
             for (std::int32_t i = mesh.offsets[v]; i < mesh.offsets[v + 1]; ++i) {
                 const std::int32_t here = mesh.corners[i] % (D + 1);
                 const std::int32_t* simplex = &mesh.simplices[mesh.corners[i] - here];
                 const auto& face = opposite_face<D>(here);
                 for (int k = 0; k < D; ++k) {
                     const std::int32_t u = simplex[face[k]];
-                    bool is_new = false;
-                    const std::int32_t position = positions.find(
-                        static_cast<std::uint32_t>(u), static_cast<std::int32_t>(neighbours.size() - row), is_new);
-                    if (is_new) neighbours.push_back(u);
-                    mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(position);
+                    std::size_t at = place[u];
+                    if (at < row || at >= neighbours.size() || neighbours[at] != u) {
+                        at = neighbours.size();
+                        place[u] = static_cast<std::uint32_t>(at);
+                        neighbours.push_back(u);
+                    }
+                    mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(at - row);
                 }
             }
             if (neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())

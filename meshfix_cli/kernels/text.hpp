@@ -9,8 +9,12 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <string>
 #include <string_view>
+#include <vector>
+
+#include "parallel.hpp"
 
 namespace meshfix {
 
@@ -32,6 +36,77 @@ inline Span next_word(std::string_view text, std::int64_t at, bool one_line) {
     return word;
 }
 
+// The words from an offset on, in pieces for threads.
+struct Pieces {
+    std::vector<std::int64_t> begin, first;  // of each piece and of the end: its offset, and the number of its first word
+
+    std::int64_t pieces() const { return static_cast<std::int64_t>(begin.size()) - 1; }
+    std::int64_t words() const { return first.back(); }
+};
+
+// How many words begin in a part of the text; `at` is where all of them begin.
+inline std::int64_t count_words(std::string_view text, std::int64_t at, std::int64_t begin, std::int64_t end) {
+    std::int64_t count = begin < end && !separates(text[begin]) && (begin == at || separates(text[begin - 1]));
+    for (std::int64_t i = begin + 1; i < end; ++i) count += separates(text[i - 1]) & !separates(text[i]);
+    return count;
+}
+
+// As many pieces as it takes to have `count` words, or all there are.
+inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    const std::int64_t piece = std::clamp<std::int64_t>(8 * count, 64, 1 << 18);
+    const auto size = static_cast<std::int64_t>(text.size());
+    Pieces pieces{{at}, {0}};
+    while (pieces.words() < count && pieces.begin.back() < size) {
+        const std::int64_t begin = pieces.begin.back(), left = (size - begin + piece - 1) / piece;
+        const std::int64_t batch = std::min<std::int64_t>(left, 4 * threads);
+        std::vector<std::int64_t> counts(batch);
+        for_each_item(batch, threads, [&](std::int64_t i) {
+            counts[i] = count_words(text, at, begin + i * piece, std::min(size, begin + (i + 1) * piece));
+        });
+        for (std::int64_t i = 0; i < batch && pieces.words() < count; ++i) {
+            pieces.begin.push_back(std::min(size, begin + (i + 1) * piece));
+            pieces.first.push_back(pieces.words() + counts[i]);
+        }
+    }
+    return pieces;
+}
+
+// Calls f(piece, at, first, last) for each piece: where its own words begin, and their numbers, below `count`.
+template <class F>
+void for_each_piece(std::string_view text, const Pieces& pieces, std::int64_t count, int threads, const F& f) {
+    for_each_item(pieces.pieces(), threads, [&](std::int64_t p) {
+        std::int64_t at = pieces.begin[p];
+        if (p > 0 && !separates(text[at - 1]))  // in a word that began in the piece before
+            while (at < pieces.begin[p + 1] && !separates(text[at])) ++at;
+        f(p, at, pieces.first[p], std::min(count, pieces.first[p + 1]));
+    });
+}
+
+// The spans of the words from an offset on, as many as there are, at most `count`.
+inline std::vector<std::int64_t> find_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    const Pieces pieces = cut(text, at, count, threads);
+    std::vector<std::int64_t> spans(2 * std::min(count, pieces.words()));
+    for_each_piece(text, pieces, count, threads, [&](std::int64_t, std::int64_t at, std::int64_t first, std::int64_t last) {
+        for (std::int64_t i = first; i < last; ++i) {
+            const Span word = next_word(text, at, false);
+            spans[2 * i] = word.begin;
+            spans[2 * i + 1] = at = word.end;
+        }
+    });
+    return spans;
+}
+
+// The offset behind the next `count` words; -1: there are fewer.
+inline std::int64_t behind_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    const Pieces pieces = cut(text, at, count, threads);
+    if (pieces.words() < count) return -1;
+    for_each_piece(text, pieces, count, 1, [&](std::int64_t p, std::int64_t begin, std::int64_t first, std::int64_t last) {
+        if (p == pieces.pieces() - 1)
+            for (at = begin; first < last; ++first) at = next_word(text, at, false).end;
+    });
+    return at;
+}
+
 // A number may begin with a plus, of which from_chars does not know.
 inline std::string_view without_plus(std::string_view word) {
     return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
@@ -42,6 +117,71 @@ inline bool read_integer(std::string_view word, std::int64_t& value, bool slash)
     word = without_plus(word);
     const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
     return error == std::errc() && (end == word.data() + word.size() || (slash && *end == '/'));
+}
+
+// The same for a plain word of at most 18 digits, quickly; false: it is none.
+inline bool read_plain_integer(const char* begin, const char* end, std::int64_t& value) {
+    const bool minus = begin < end && *begin == '-';
+    begin += minus;
+    if (end - begin < 1 || end - begin > 18) return false;
+    value = 0;
+    for (; begin < end; ++begin) {
+        const unsigned digit = static_cast<unsigned char>(*begin) - unsigned{'0'};
+        if (digit > 9) return false;
+        value = 10 * value + digit;
+    }
+    if (minus) value = -value;
+    return true;
+}
+
+// Integers of the words from an offset on, in the type T: as many as there are in a row, at most `count`.
+template <class T>
+struct Integers {
+    std::vector<T> values;
+    std::int64_t end;      // behind the last
+    std::int64_t bad = -1; // the offset of what is not an integer, or the size of the text where words are missing
+    bool fit = true;       // all are numbers of the type
+};
+
+template <class T>
+Integers<T> read_integers(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    struct Part {
+        std::int64_t bad = -1, end = -1, read = 0;
+        bool fit = true;
+    };
+    const Pieces pieces = cut(text, at, count, threads);
+    Integers<T> result{{}, at};
+    result.values.resize(std::min(count, pieces.words()));
+    std::vector<Part> parts(pieces.pieces());
+    for_each_piece(text, pieces, count, threads, [&](std::int64_t p, std::int64_t at, std::int64_t first, std::int64_t last) {
+        Part part;
+        for (std::int64_t i = first; i < last; ++i, ++part.read) {
+            const Span word = next_word(text, at, false);
+            std::int64_t value = 0;
+            if (!read_plain_integer(text.data() + word.begin, text.data() + word.end, value) &&
+                !read_integer(text.substr(word.begin, word.end - word.begin), value, false)) {
+                part.bad = word.begin;
+                break;
+            }
+            result.values[i] = static_cast<T>(value);
+            part.fit &= result.values[i] == value;
+            part.end = at = word.end;
+        }
+        parts[p] = part;
+    });
+    std::int64_t read = 0;
+    for (const Part& part : parts) {
+        read += part.read;
+        result.fit &= part.fit;
+        if (part.end >= 0) result.end = part.end;
+        if (part.bad >= 0) {
+            result.bad = part.bad;
+            break;
+        }
+    }
+    if (result.bad < 0 && read < count) result.bad = static_cast<std::int64_t>(text.size());
+    result.values.resize(read);
+    return result;
 }
 
 // The slow way: Fortran's exponents, numbers too large or too small, and libraries without from_chars.

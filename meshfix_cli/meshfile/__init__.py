@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli._kernels import use_threads
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh import CELL_NAMES, Mesh
 from meshfix_cli.meshfile import formats
@@ -68,6 +69,7 @@ def read(
     InvalidMeshError
         See `Mesh.build`.
     """
+    use_threads(threads)
     streamed = os.fspath(path) == "-"
     name = "<stdin>" if streamed else os.fspath(path)
     try:

@@ -269,16 +269,16 @@ def _with_regions(source: Source, name: str) -> Source:
 def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
     topology, (one, many) = mesh.topology, CELL_NAMES[mesh.dimension]
     notes = []
-    if len(topology.simplices) < rows:
-        repeated = counted(rows - len(topology.simplices), f"{one} is a repetition", f"{many} are repetitions")
+    if topology.m < rows:
+        repeated = counted(rows - topology.m, f"{one} is a repetition", f"{many} are repetitions")
         notes.append(f"{repeated} of another and not counted")
     isolated = topology.n - int(topology.used.sum())
     if isolated:
         notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
     mirrored, which = int(topology.mirrored.sum()), ""
-    if mirrored == len(topology.simplices) and seen_from_above:
+    if mirrored == topology.m and seen_from_above:
         which = "the elements are"
-    elif 0 < mirrored < len(topology.simplices):
+    elif 0 < mirrored < topology.m:
         which = counted(mirrored, f"{one} in a separate part is", f"{many} in separate parts are")
     if which:
         kept = "solved so, and the numbering is kept; --fix-orientation would turn it"

@@ -76,7 +76,7 @@ class Text(Numbers):
     def all_integers(self) -> Int64:
         """Read integers up to the first word that is none."""
         values, self.at, _ = _kernels.scan_integers(self.data, self.at, len(self.data))
-        return values
+        return values.astype(np.int64, copy=False)
 
     def coordinates(self, count: int, width: int) -> Places:
         """Go over rows of `width` numbers; the places of the first three of each."""

@@ -49,10 +49,21 @@ def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:
 
 def integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int64], int]:
     """Return the next integers (count,) and the offset behind them; ReadError where there are not as many."""
+    values, end = short_integers(data, at, count)
+    return values.astype(np.int64, copy=False), end
+
+
+def short_integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int32] | NDArray[np.int64], int]:
+    """Do the same, in 32 bits where these are enough."""
     values, end, bad = _kernels.scan_integers(data, at, count)
     if bad >= 0:
         raise _not_a_number(data, bad, "an integer")
     return values, end
+
+
+def behind_words(data: bytes, at: int, count: int) -> int:
+    """Return the offset behind the next words; -1: there are fewer."""
+    return _kernels.behind_words(data, at, count)
 
 
 def integers_at(data: bytes, spans: Spans, slash: bool = False) -> NDArray[np.int64]:

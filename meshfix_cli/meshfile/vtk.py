@@ -25,6 +25,8 @@ _POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
 }  # fmt: skip
 _POLYHEDRON = 42
 
+Integers = NDArray[np.int32] | NDArray[np.int64]
+
 
 def parse(data: bytes) -> Source | None:
     """Read points and cells; None where the dataset is of another type, or the points are integers."""
@@ -66,9 +68,9 @@ class _Table(NamedTuple):
     """
 
     first: int
-    types: NDArray[np.int64]
+    types: Integers
     offsets: NDArray[np.int64]
-    vertices: NDArray[np.int64]
+    vertices: Integers
     numbers: Array
     gap: int
 
@@ -98,11 +100,9 @@ def _table(first: int, keyword: bytes, found: Sections) -> _Table:
             raise ReadError("is truncated: the section CELL_TYPES is missing")
         types = _integers(found.types)
     if where is None:
-        starts = _starts(numbers, count, types)
-        offsets = np.concatenate([[0], np.cumsum(numbers[starts])])
-        numbers = np.delete(numbers, starts)
+        offsets, numbers = _split(numbers, count, types)
     else:
-        offsets = _integers(where)
+        offsets = _integers(where).astype(np.int64)
         ends = [offsets[0], offsets.min(), offsets.max(), offsets[-1]]
         if ends != [0, 0, len(numbers), len(numbers)]:
             raise ReadError("is not a readable vtk file: the offsets of its cells do not fit their vertices")
@@ -111,18 +111,25 @@ def _table(first: int, keyword: bytes, found: Sections) -> _Table:
     return _Table(first, types, offsets, numbers, array, int(where is None))
 
 
-def _integers(array: Array) -> NDArray[np.int64]:
+def _integers(array: Array) -> Integers:
     values = array.values()
     if values.dtype.kind == "f":
         raise ReadError("is not a readable vtk file: its cells are not integers")
-    return values.astype(np.int64)
+    return values if values.dtype == np.int32 else values.astype(np.int64)
 
 
-def _starts(numbers: NDArray[np.int64], count: int, types: NDArray[np.int64] | None) -> NDArray[np.int64]:
-    """Where, among numbers, stands that of the vertices of each cell."""
+def _split(numbers: Integers, count: int, types: Integers | None) -> tuple[NDArray[np.int64], Integers]:
+    """Separate the numbers of vertices, of which they give the offsets (count+1,), from the vertices."""
     each, rest = divmod(len(numbers), max(count, 1))
     if count and each and not rest and (numbers[::each] == each - 1).all():
-        return np.arange(0, len(numbers), each)
+        return np.arange(count + 1) * (each - 1), numbers.reshape(count, each)[:, 1:].ravel()
+    starts = _starts(numbers, count, types)
+    vertices = np.delete(numbers, starts).view(numbers.dtype)
+    return np.concatenate([[0], np.cumsum(numbers[starts], dtype=np.int64)]), vertices
+
+
+def _starts(numbers: Integers, count: int, types: Integers | None) -> NDArray[np.int64]:
+    """Where, among numbers, stands that of the vertices of each cell."""
     if types is not None and len(types) == count:
         kinds, which = np.unique(types, return_inverse=True)
         sizes = np.array([TYPES.get(kind, ("", 0))[1] for kind in kinds.tolist()])[which]
@@ -132,7 +139,7 @@ def _starts(numbers: NDArray[np.int64], count: int, types: NDArray[np.int64] | N
     return _chain(numbers, count)
 
 
-def _chain(numbers: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def _chain(numbers: Integers, count: int) -> NDArray[np.int64]:
     """The same, step by step: each number tells where the next one is."""
     starts, at, view = [], 0, numbers.data
     for _ in range(count):

@@ -43,13 +43,13 @@ class Run(NamedTuple):
     type : str
     rows : (k,) int64
         Which cells of the file they are.
-    vertices : (k, size) int64
+    vertices : (k, size) int
         In meshio's order.
     """
 
     type: str
     rows: NDArray[np.int64]
-    vertices: NDArray[np.int64]
+    vertices: NDArray[np.integer[Any]]
 
     @property
     def cells(self) -> Cells:
@@ -57,7 +57,9 @@ class Run(NamedTuple):
         return Cells(self.type, self.vertices, self.rows)
 
 
-def runs(types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivity: NDArray[np.int64]) -> list[Run]:
+def runs(
+    types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivity: NDArray[np.integer[Any]]
+) -> list[Run]:
     """Cut cells into runs, in the order of the file where they are not too many.
 
     Parameters
@@ -66,7 +68,7 @@ def runs(types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivi
         Numbers of VTK.
     offsets : (m+1,) int64
         Cell i has the vertices `connectivity[offsets[i]:offsets[i + 1]]`.
-    connectivity : (k,) int64
+    connectivity : (k,) int
 
     Raises
     ------
@@ -84,8 +86,11 @@ def runs(types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivi
             name = "triangle"
         if expected not in (0, size):
             raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {size} vertices")
-        at = offsets[rows][:, None] + np.array(_ORDER.get(number, range(size)), dtype=np.int64)
-        found.append(Run(name, rows, connectivity[at]))
+        if number not in _ORDER and rows[-1] - rows[0] == len(rows) - 1:  # they stand one behind the other
+            vertices = connectivity[offsets[rows[0]] : offsets[rows[-1] + 1]].reshape(len(rows), size)
+        else:
+            vertices = connectivity[offsets[rows][:, None] + np.array(_ORDER.get(number, range(size)), dtype=np.int64)]
+        found.append(Run(name, rows, vertices))
     return found
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import REGIONS
 from meshfix_cli.meshfile.splice import Places
-from meshfix_cli.meshfile.text import integers, numbers_at, words
+from meshfix_cli.meshfile.text import behind_words, numbers_at, short_integers, words
 
 _HEAD = re.compile(
     rb"(?:\xef\xbb\xbf)?\s*# vtk DataFile Version\s+(\d{1,9})[^\n]*\n[^\n]*\n\s*(ascii|binary)\s+dataset\s+(\w+)\s",
@@ -36,7 +36,6 @@ _COMPONENTS = {
 }  # fmt: skip
 _ATTRIBUTES = (b"scalars", b"color_scalars", b"lookup_table", b"texture_coordinates", *_COMPONENTS)
 _CELLS = (b"cells", b"vertices", b"lines", b"polygons", b"triangle_strips")
-_CHUNK = 1 << 16  # words that are skipped at a time
 
 
 class Odd(ReadError):
@@ -96,8 +95,8 @@ class Array:
         dtype = self._dtype()
         if dtype.kind == "f":
             return numbers_at(self.data, words(self.data, self.begin, self.size), dtype)
-        read, _ = integers(self.data, self.begin, self.size)
-        values = read.astype(dtype)
+        read, _ = short_integers(self.data, self.begin, self.size)
+        values = read.astype(dtype, copy=False)
         if (values != read).any():
             raise Odd(f"has numbers in its array {self.name!r} that are too large for their type")
         return values
@@ -255,11 +254,10 @@ class Sections:
         return array
 
     def _behind_words(self, at: int, count: int) -> int:
-        if 2 * count > len(self.data) - at + 1:
+        end = behind_words(self.data, at, count) if 2 * count <= len(self.data) - at + 1 else -1
+        if end < 0:
             raise ReadError(f"is truncated: it ends within {count:,} numbers that it announces")
-        for first in range(0, count, _CHUNK):
-            at = int(words(self.data, at, min(_CHUNK, count - first))[-1, 1])
-        return at
+        return end
 
     def _behind_strings(self, at: int, count: int, prefixed: bool) -> int:
         """Strings stand in lines or behind their lengths; the first two bits of a length tell its size."""

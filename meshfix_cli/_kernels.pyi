@@ -31,8 +31,13 @@ class Connectivity:
     def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32]:
         """Facets (f, d) without a movable vertex, each once, and a simplex of each."""
 
-    def summarise(self, points: Float64, threads: int) -> tuple[Float64, Int32, int, float, float]:
-        """Smallest angle (m,) in radians, inverted simplices, folded facets, smallest measure, largest angle."""
+    def summarise(
+        self, points: Float64, bins: int, width: float, threads: int
+    ) -> tuple[Float64, Int64, float, Int32, int, float, float]:
+        """Smallest angles (m,), their histogram and sum, inverted simplices, folded facets, smallest measure.
+
+        Last comes the largest angle. Angles are in radians, as is the width of the bins.
+        """
 
     @property
     def crowded(self) -> int:
@@ -75,6 +80,9 @@ def used_vertices(simplices: Int32, n: int) -> Int32:
 
 def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
     """Rows of the inverted simplices, and the smallest signed measure."""
+
+def moved(before: Float64, after: Float64) -> NDArray[np.uint8]:
+    """1 for the rows (n,) that differ."""
 
 def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
     """Return the smallest sign * sine^2 of all simplices; -1 where one is not valid."""

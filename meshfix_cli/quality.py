@@ -84,23 +84,32 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summ
         `folded` counts interior facets with both simplices on one side; `percentile_1` is that of the elements'
         smallest angles; `histogram` counts those in bins of `BIN_WIDTH` degrees.
     """
-    connectivity = mesh.topology.connectivity
-    radians, inverted, folded, min_measure, largest = connectivity.summarise(mesh.along_curve(mesh.points), threads)
-    smallest = np.degrees(radians)
-    bins = BINS[mesh.dimension]
+    connectivity, bins = mesh.topology.connectivity, BINS[mesh.dimension]
+    smallest, histogram, total, inverted, folded, min_measure, largest = connectivity.summarise(
+        mesh.along_curve(mesh.points), bins, math.radians(BIN_WIDTH), threads
+    )
     return Summary(
         elements=len(smallest),
         inverted=len(inverted),
         folded=folded,
         min_measure=min_measure,
-        min_angle=float(smallest.min()),
+        min_angle=math.degrees(smallest.min()),
         max_angle=math.degrees(largest),
-        mean_min_angle=float(smallest.mean()),
-        percentile_1=float(np.percentile(smallest, 1)),
-        histogram=tuple(np.histogram(smallest, bins, (0.0, bins * BIN_WIDTH))[0].tolist()),
+        mean_min_angle=math.degrees(total / len(smallest)),
+        percentile_1=math.degrees(_percentile(smallest, 1, histogram)),
+        histogram=tuple(histogram.tolist()),
         metrics={name: _worst_and_mean(name, mesh) for name in metrics},
         inverted_elements=np.sort(connectivity.rows[inverted]),
     )
+
+
+def _percentile(angles: Array, percent: float, histogram: NDArray[np.int64]) -> float:
+    """Return a percentile as numpy does, of the bins that it can be in."""
+    rank = percent / 100 * (len(angles) - 1)
+    here, behind = int(rank), min(int(rank) + 1, len(angles) - 1)
+    bins = np.searchsorted(np.cumsum(histogram), behind, side="right") + 2  # one more, for rounding at its edge
+    low = np.partition(angles[angles < math.radians(float(bins) * BIN_WIDTH)], (here, behind))
+    return float(low[here] + (low[behind] - low[here]) * (rank - here))
 
 
 @dataclass(frozen=True)

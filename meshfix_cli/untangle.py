@@ -310,7 +310,7 @@ class _Run:
 
     def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
         """Take the points of a sweep; return whether there was progress."""
-        self.changed = (points != self.points).any(axis=1)
+        self.changed = _kernels.moved(self.points, points).view(bool)
         if self.only_invalid and not phase.moves:
             self.near = self.near | self.changed
         self.points = points
@@ -367,8 +367,8 @@ class _Run:
                 visited = near & (self._broken() | self._grown(self.changed, 1))
             yield self._relocated(move, visited, threshold)
             visited = near
-            if len(phase.moves) == 1:  # elsewhere a second visit finds what the first did
-                visited = near & self._grown(self.changed, 1)
+            if len(phase.moves) == 1 and 2 * self.record.moved < len(self.points):
+                visited = near & self._grown(self.changed, 1)  # elsewhere a second visit finds what the first did
 
     def _raisings(self, move: Move, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
         ceiling = self._min_sine2(self.stuck)

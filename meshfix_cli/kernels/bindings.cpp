@@ -149,13 +149,23 @@ auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movab
                           to_numpy(std::move(found.owners)));
 }
 
-auto summarise_py(const PyConnectivity& self, const Matrix<const double>& points, int threads) {
+auto summarise_py(const PyConnectivity& self, const Matrix<const double>& points, int bins, double width, int threads) {
     check_points(points, self);
     Summary total = with_dimension(self.dimension, [&](auto d) {
-        return summarise<d>(points.data(), self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), threads);
+        return summarise<d>(points.data(), self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), bins, width,
+                            threads);
     });
-    return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.inverted)), total.folded,
-                           total.min_measure, total.largest);
+    return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.histogram)), total.sum,
+                           to_numpy(std::move(total.inverted)), total.folded, total.min_measure, total.largest);
+}
+
+// Where two arrays of points differ.
+auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after) {
+    if (before.size() != after.size()) throw nb::value_error("the points are of two meshes");
+    const std::size_t n = before.shape(0), d = before.shape(1);
+    std::vector<std::uint8_t> moved(n, 0);
+    for (std::size_t i = 0; i < n * d; ++i) moved[i / d] |= before.data()[i] != after.data()[i];
+    return to_numpy(std::move(moved));
 }
 
 auto used_vertices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
@@ -315,7 +325,7 @@ auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::ui
 auto crossings_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets, int threads) {
     const auto count = static_cast<std::int64_t>(facets.shape(0));
     std::vector<std::int32_t> pairs = with_dimension(
-        points.shape(1), [&](auto d) { return Crossings<d>(points.data(), facets.data(), count).find(threads); });
+        points.shape(1), [&](auto d) { return Crossings<d>(points.data(), facets.data(), count, threads).find(threads); });
     return to_numpy(std::move(pairs), 2);
 }
 
@@ -475,6 +485,7 @@ NB_MODULE(_kernels, m) {
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert());
     m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
@@ -507,7 +518,7 @@ NB_MODULE(_kernels, m) {
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
         .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)
         .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a)
-        .def("summarise", &summarise_py, "points"_a.noconvert(), "threads"_a)
+        .def("summarise", &summarise_py, "points"_a.noconvert(), "bins"_a, "width"_a, "threads"_a)
         .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })
         .def_prop_ro("orientable", [](PyConnectivity& self) { return self.mesh.orientable; })
         .def_prop_ro("simplices", &rows_view<&Connectivity::simplices>)

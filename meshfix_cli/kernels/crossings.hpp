@@ -46,10 +46,18 @@ inline bool pierces(const Vec<3>& p, const Vec<3>& q, const std::array<Vec<3>, 3
 template <int D>
 class Crossings {
    public:
-    Crossings(const double* points, const std::int32_t* facets, std::int64_t count)
+    Crossings(const double* points, const std::int32_t* facets, std::int64_t count, int threads)
         : points_(points), facets_(facets), order_(count), leaves_(count) {
         std::iota(order_.begin(), order_.end(), 0);
-        if (count > 0) build(0, 0, count);
+        if (count == 0) return;
+        std::size_t nodes = 1;
+        for (std::int64_t size = count; size > LEAF; size = (size + 1) / 2) nodes = 2 * nodes + 1;
+        boxes_.resize(nodes);
+        split(0, 0, count, 0);
+        for_each_item(static_cast<std::int64_t>(parts_.size()), threads, [&](std::int64_t i) {
+            build(parts_[i].node, parts_[i].begin, parts_[i].end);
+        });
+        for (auto node = above_.rbegin(); node != above_.rend(); ++node) join(*node);
     }
 
     std::vector<std::int32_t> find(int threads) const {
@@ -67,6 +75,12 @@ class Crossings {
 
    private:
     static constexpr std::int64_t LEAF = 8, FACETS_PER_ITEM = 1024;
+    static constexpr int PARTS_AT = 5;  // depth in the tree
+
+    struct Part {
+        std::size_t node;
+        std::int64_t begin, end;
+    };
 
     struct Box {
         Vec<D> low, high;
@@ -98,15 +112,38 @@ class Crossings {
         return box;
     }
 
-    // Cut in two halves along the longest side of the box of the first vertices.
+    // Cuts down to parts that are built by themselves.
+    void split(std::size_t node, std::int64_t begin, std::int64_t end, int depth) {
+        if (depth == PARTS_AT || end - begin <= LEAF) {
+            parts_.push_back({node, begin, end});
+            return;
+        }
+        above_.push_back(node);
+        const std::int64_t middle = halve(begin, end);
+        split(2 * node + 1, begin, middle, depth + 1);
+        split(2 * node + 2, middle, end, depth + 1);
+    }
+
     void build(std::size_t node, std::int64_t begin, std::int64_t end) {
-        if (boxes_.size() <= node) boxes_.resize(2 * node + 1);
         if (end - begin <= LEAF) {
             for (std::int64_t i = begin; i < end; ++i) leaves_[i] = box_of(order_[i]);
             boxes_[node] = leaves_[begin];
             for (std::int64_t i = begin + 1; i < end; ++i) boxes_[node].add(leaves_[i]);
             return;
         }
+        const std::int64_t middle = halve(begin, end);
+        build(2 * node + 1, begin, middle);
+        build(2 * node + 2, middle, end);
+        join(node);
+    }
+
+    void join(std::size_t node) {
+        boxes_[node] = boxes_[2 * node + 1];
+        boxes_[node].add(boxes_[2 * node + 2]);
+    }
+
+    // In two halves along the longest side of the box of the first vertices.
+    std::int64_t halve(std::int64_t begin, std::int64_t end) {
         Box box{vertex(order_[begin], 0), vertex(order_[begin], 0)};
         for (std::int64_t i = begin; i < end; ++i) box.add(vertex(order_[i], 0));
         int axis = 0;
@@ -118,10 +155,7 @@ class Crossings {
                              const double p = vertex(a, 0)[axis], q = vertex(b, 0)[axis];
                              return p != q ? p < q : a < b;
                          });
-        build(2 * node + 1, begin, middle);
-        build(2 * node + 2, middle, end);
-        boxes_[node] = boxes_[2 * node + 1];
-        boxes_[node].add(boxes_[2 * node + 2]);
+        return middle;
     }
 
     // Appends pairs until there are `full` numbers.
@@ -170,6 +204,8 @@ class Crossings {
     const double* points_;
     const std::int32_t* facets_;
     std::vector<std::int32_t> order_;
+    std::vector<Part> parts_;         // of the tree, and the nodes above them, each before its children
+    std::vector<std::size_t> above_;
     std::vector<Box> leaves_, boxes_;  // of the facets in `order_`, of the nodes
 };
 

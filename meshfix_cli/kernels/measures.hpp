@@ -154,32 +154,33 @@ double min_sine2(const double* points, const std::int32_t* simplices, std::int64
 
 // What a report needs to know. Angles in radians.
 struct Summary {
-    std::vector<double> smallest;        // (m,) the smallest angle of each simplex
-    std::vector<std::int32_t> inverted;  // simplices, ascending
-    std::int64_t folded = 0;             // facets with both simplices on one side
+    std::vector<double> smallest;         // (m,) the smallest angle of each simplex
+    std::vector<std::int64_t> histogram;  // of these
+    double sum = 0.0;                     // of these
+    std::vector<std::int32_t> inverted;   // simplices, ascending
+    std::int64_t folded = 0;              // facets with both simplices on one side
     double min_measure = INFINITY, largest = 0.0;
 };
 
+// The histogram has `bins` bins of `width`.
 template <int D>
 Summary summarise(const double* points, const std::int32_t* simplices, const std::int32_t* mates, std::int64_t m,
-                  int threads) {
-    struct Part {
-        std::vector<std::int32_t> inverted;
-        std::int64_t folded = 0;
-        double min_det = INFINITY, largest = 0.0;
-    };
+                  int bins, double width, int threads) {
     Summary total;
     total.smallest.resize(m);
     std::vector<std::int8_t> sign(m);
-    std::vector<Part> parts(m / PER_ITEM + 1);
+    std::vector<Summary> parts(m / PER_ITEM + 1);
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        Part part;
+        Summary part;
+        part.histogram.resize(bins);
         for_each_angles<D>(points, simplices, begin, end, [&](std::int64_t s, const Edges<D>& e, AngleRange range) {
             const double det = determinant(e);
             if (!is_valid<D>(e, det)) part.inverted.push_back(static_cast<std::int32_t>(s));
-            part.min_det = std::min(part.min_det, det);
+            part.min_measure = std::min(part.min_measure, det / factorial(D));
             sign[s] = static_cast<std::int8_t>((det > 0.0) - (det < 0.0));
             total.smallest[s] = range.smallest;
+            part.sum += range.smallest;
+            ++part.histogram[std::min(bins - 1, static_cast<int>(range.smallest / width))];
             part.largest = std::max(part.largest, range.largest);
         });
         parts[item] = std::move(part);
@@ -188,13 +189,15 @@ Summary summarise(const double* points, const std::int32_t* simplices, const std
         for (std::int64_t c = begin * (D + 1); c < end * (D + 1); ++c)
             parts[item].folded += mates[c] > c && sign[c / (D + 1)] * sign[mates[c] / (D + 1)] < 0;
     });
+    total.histogram.assign(bins, 0);
     for (const auto& part : parts) {
+        for (std::size_t bin = 0; bin < part.histogram.size(); ++bin) total.histogram[bin] += part.histogram[bin];
+        total.sum += part.sum;
         total.inverted.insert(total.inverted.end(), part.inverted.begin(), part.inverted.end());
         total.folded += part.folded;
-        total.min_measure = std::min(total.min_measure, part.min_det);
+        total.min_measure = std::min(total.min_measure, part.min_measure);
         total.largest = std::max(total.largest, part.largest);
     }
-    total.min_measure /= factorial(D);
     return total;
 }
 

@@ -119,18 +119,23 @@ inline bool read_integer(std::string_view word, std::int64_t& value, bool slash)
     return error == std::errc() && (end == word.data() + word.size() || (slash && *end == '/'));
 }
 
-// The same for a plain word of at most 18 digits, quickly; false: it is none.
-inline bool read_plain_integer(const char* begin, const char* end, std::int64_t& value) {
-    const bool minus = begin < end && *begin == '-';
-    begin += minus;
-    if (end - begin < 1 || end - begin > 18) return false;
+// Finds the next word and reads it, if it is a plain integer of at most 18 digits, in one pass; false: it is none, and
+// `at` stays.
+inline bool read_plain_integer(std::string_view text, std::int64_t& at, std::int64_t& value) {
+    const char *p = text.data() + at, *const end = text.data() + text.size();
+    while (p < end && separates(*p)) ++p;
+    const bool minus = p < end && *p == '-';
+    p += minus;
+    const char* const digits = p;
     value = 0;
-    for (; begin < end; ++begin) {
-        const unsigned digit = static_cast<unsigned char>(*begin) - unsigned{'0'};
-        if (digit > 9) return false;
+    for (; p < end && p - digits < 18; ++p) {
+        const unsigned digit = static_cast<unsigned char>(*p) - unsigned{'0'};
+        if (digit > 9) break;
         value = 10 * value + digit;
     }
+    if (p == digits || (p < end && !separates(*p))) return false;
     if (minus) value = -value;
+    at = p - text.data();
     return true;
 }
 
@@ -156,16 +161,18 @@ Integers<T> read_integers(std::string_view text, std::int64_t at, std::int64_t c
     for_each_piece(text, pieces, count, threads, [&](std::int64_t p, std::int64_t at, std::int64_t first, std::int64_t last) {
         Part part;
         for (std::int64_t i = first; i < last; ++i, ++part.read) {
-            const Span word = next_word(text, at, false);
             std::int64_t value = 0;
-            if (!read_plain_integer(text.data() + word.begin, text.data() + word.end, value) &&
-                !read_integer(text.substr(word.begin, word.end - word.begin), value, false)) {
-                part.bad = word.begin;
-                break;
+            if (!read_plain_integer(text, at, value)) {
+                const Span word = next_word(text, at, false);
+                if (!read_integer(text.substr(word.begin, word.end - word.begin), value, false)) {
+                    part.bad = word.begin;
+                    break;
+                }
+                at = word.end;
             }
             result.values[i] = static_cast<T>(value);
             part.fit &= result.values[i] == value;
-            part.end = at = word.end;
+            part.end = at;
         }
         parts[p] = part;
     });

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli import _kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError
 from meshfix_cli.mesh import CELL_NAMES, LARGEST_COORDINATE, Mesh, Topology
 from meshfix_cli.meshfile.formats import Format
@@ -59,7 +60,7 @@ class Document:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
         original = self.source.points
         points: NDArray[np.floating[Any]] = original.copy()
-        moved = (mesh.points != self.mesh.points).any(axis=1) & mesh.topology.used
+        moved = _kernels.moved(self.mesh.points, mesh.points).view(bool) & mesh.topology.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
                 points[moved] = mesh.points[moved]

@@ -137,6 +137,9 @@ def min_norm_point(vectors: Float64) -> Float64:
 def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[Float64, Float64, float]:
     """Sines of a star, their gradients, and sign * (smallest sine)^2 (-1 where the star is not valid)."""
 
+def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, float, Float64, Float64]:
+    """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""
+
 def find_words(data: bytes, offsets: Int64, count: int, one_line: bool) -> Int64:
     """Spans (k * count, 2) of the first words at or behind each offset (k,).
 

@@ -184,7 +184,8 @@ def steps(
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
     """Run the phases; yield the mesh and a record as it came and after each sweep.
 
-    A valid mesh without an angle below the threshold, but for simplices without a free vertex, is left alone.
+    A valid mesh without an angle below the threshold, but for simplices without a free vertex, is left alone, unless a
+    phase goes up to the ceiling.
 
     A phase that starts from the best mesh where that is not the last one begins with a record of phase "best";
     smoothing does. The last mesh is never worse than the first, by (inverted elements, smallest measure).
@@ -208,7 +209,9 @@ def steps(
     degrees = THRESHOLD[mesh.dimension] if threshold is None else threshold
     run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, threads)
     yield run.mesh, run.record
-    if run.record.inverted == 0 and (only_invalid or _meets_target(mesh, degrees, threads)):
+    phases = tuple(phases)
+    to_the_ceiling = any(phase.until == "ceiling" for phase in phases)
+    if run.record.inverted == 0 and (only_invalid or (not to_the_ceiling and _meets_target(mesh, degrees, threads))):
         return
     for phase in phases:
         untangling = not phase.smooths

@@ -388,6 +388,17 @@ def test_closed_streams(streams: str, tmp_path: Path) -> None:
     assert piped.stdout == (tmp_path / "out.vtk").read_bytes()
 
 
+def test_the_best_smoothing_is_named_in_the_report(tmp_path: Path) -> None:
+    facts = [
+        json.loads(run("untangle", "--json", "--smooth", smooth, TANGLED, tmp_path / "o.vtk").stdout)
+        for smooth in (3, "best")
+    ]
+    assert {"smoothing", "smoothing the mean"} <= {sweep["phase"] for sweep in facts[1]["sweeps"]}
+    angles = [one["quality"]["smoothed"]["mean_min_angle"] for one in facts]
+    assert angles[1] > angles[0]
+    assert b"best" in run("untangle", "--help").stdout
+
+
 def test_options_of_holding_and_smoothing_reach_the_work(tmp_path: Path) -> None:
     mesh = meshio.read(VALID)
     inner = np.flatnonzero(read(VALID).mesh.movable)

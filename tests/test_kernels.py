@@ -47,6 +47,37 @@ def test_sines_are_those_of_the_metric(mesh: Mesh) -> None:
 
 
 @pytest.mark.parametrize("d", [2, 3])
+def test_mean_ratio_is_the_metrics_and_its_derivatives_are_right(random: np.random.Generator, d: int) -> None:
+    power, regular = (2.0, 2 * math.sqrt(3)) if d == 2 else (2.25, 6 * 2 ** (1 / 3))
+    checked = 0
+    for _ in range(100):
+        points, faces = random_star(random, d, spread=0.1)
+        x = random.uniform(-0.05, 0.05, d)
+        value, again, gradient, hessian = _kernels.mean_ratio(points, faces, x)
+        if _kernels.sines(points, faces, x)[2] < 0.01:
+            continue
+        star = points[faces]
+        edges = star - x
+        metric = METRICS["mean_ratio"].evaluate(edges, np.linalg.det(edges) / math.factorial(d))
+        expected = ((regular / metric) ** power).sum()
+        assert value == pytest.approx(expected, rel=1e-12)
+        assert again == pytest.approx(expected, rel=1e-12)
+        step = 1e-5
+        for k, unit in enumerate(np.eye(d)):
+            plus, minus = (_kernels.mean_ratio(points, faces, x + s * step * unit) for s in (1, -1))
+            size = np.abs(hessian).max()
+            assert gradient[k] == pytest.approx((plus[0] - minus[0]) / (2 * step), rel=1e-5, abs=1e-6 * size)
+            np.testing.assert_allclose(hessian[k], (plus[2] - minus[2]) / (2 * step), rtol=1e-5, atol=1e-6 * size)
+        checked += 1
+    assert checked > 20
+
+
+def test_mean_ratio_is_infinite_where_a_simplex_is_inverted(random: np.random.Generator) -> None:
+    points, faces = random_star(random, 3, spread=0.1)
+    assert _kernels.mean_ratio(points, faces, 3 * points[faces[0]].mean(axis=0))[1] == math.inf
+
+
+@pytest.mark.parametrize("d", [2, 3])
 def test_min_norm_point_is_optimal_and_in_the_hull(random: np.random.Generator, d: int) -> None:
     for trial in range(500):
         vectors = random.standard_normal((int(random.integers(1, 12)), d)) + random.uniform(0, 2)
@@ -155,7 +186,7 @@ def relocated(mesh: Mesh, move: Move, threads: int, rotate: int) -> bytes:
 
 @pytest.mark.parametrize("move", list(Move))
 def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move: Move) -> None:
-    smoothing = move in (Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH)
+    smoothing = move in (Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH, Move.MEAN_RATIO, Move.RAISE_SMALLEST)
     start = tangle(fine, 5, 0.3) if smoothing else tangle(fine)
     expected = relocated(start, move, 1, 0)
     assert expected != start.points.tobytes()
@@ -182,7 +213,7 @@ def test_laplacian_moves_to_the_mean_of_the_neighbours(plate: Mesh) -> None:
     np.testing.assert_allclose(points[vertex], plate.points[row].mean(axis=0), rtol=1e-14)
 
 
-@pytest.mark.parametrize("move", [Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH])
+@pytest.mark.parametrize("move", [Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH, Move.RAISE_SMALLEST])
 def test_smoothing_never_lowers_the_worst_of_a_star(mesh: Mesh, move: Move) -> None:
     """Star by star, on a mesh with invalid stars, which must be left alone."""
     points = tangle(mesh, 20, 0.6).points.copy()
@@ -197,6 +228,54 @@ def test_smoothing_never_lowers_the_worst_of_a_star(mesh: Mesh, move: Move) -> N
         assert after >= before * (1 - 1e-12) if before > 0 else (points[vertex] == old).all()
         improved += after > before
     assert improved > 20
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.15])
+def test_the_mean_ratio_gets_better_above_the_floor(mesh: Mesh, floor: float) -> None:
+    """Star by star: neither below the floor nor, where it was below, lower than it was."""
+    points, simplices = tangle(mesh, 20, 0.3).points.copy(), mesh.topology.simplices
+    improved = lowered = 0
+    for vertex in np.flatnonzero(mesh.movable)[:400]:
+        star = simplices[star_rows(mesh, vertex)[2]]
+        before, ratio, old = worst_sine(points, star), inverse_ratio(points, star), points[vertex].copy()
+        only = mesh.movable & (np.arange(mesh.topology.n) == vertex)
+        for blocks in mesh.topology.colours:
+            relocate(mesh, Move.MEAN_RATIO, points, blocks, only, threshold_sine2=floor**2)
+        after = worst_sine(points, star)
+        if before <= 0 or (points[vertex] == old).all():
+            assert (points[vertex] == old).all()
+            continue
+        assert after >= min(before, floor) * (1 - 1e-11)
+        assert inverse_ratio(points, star) < ratio
+        improved, lowered = improved + 1, lowered + (after < before)
+    assert improved > 50
+    assert lowered > 0
+
+
+def inverse_ratio(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> float:
+    corners = points[simplices]
+    measure = _kernels.measure(points, np.ascontiguousarray(simplices), 1)[0]
+    power = 2.0 if points.shape[1] == 2 else 2.25
+    with np.errstate(divide="ignore"):
+        ratio = METRICS["mean_ratio"].evaluate(corners[:, 1:] - corners[:, :1], measure)
+        return float((ratio**-power).sum())
+
+
+def test_only_stars_below_the_threshold_are_raised(mesh: Mesh) -> None:
+    start = tangle(mesh, 20, 0.3)
+    points, bound = start.points.copy(), 0.3 if mesh.dimension == 3 else 0.6
+    free = np.flatnonzero(mesh.movable).tolist()
+    low = {v: worst_sine(points, mesh.topology.simplices[star_rows(mesh, v)[2]]) for v in free}
+    stay = [v for v, sine in low.items() if sine >= bound or sine <= 0]
+    for vertex in stay[:200]:
+        only = mesh.movable & (np.arange(mesh.topology.n) == vertex)
+        for blocks in mesh.topology.colours:
+            relocate(mesh, Move.RAISE_SMALLEST, points, blocks, only, threshold_sine2=bound**2)
+    assert points.tobytes() == start.points.tobytes()
+    for blocks in mesh.topology.colours:
+        relocate(mesh, Move.RAISE_SMALLEST, points, blocks, threshold_sine2=bound**2)
+    moved = np.flatnonzero((points != start.points).any(axis=1))
+    assert 10 < len(moved) < len(low)
 
 
 def worst_sine(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -132,3 +133,58 @@ def test_the_first_two_corners_change_places() -> None:
     binary = Places.of_rows(np.array([0, 12]), 3, ">i4")
     after = np.frombuffer(apply(rows, [binary.exchange(rows, np.array([1]))]), dtype=">i4")
     assert after.tolist() == [0, 1, 2, 4, 3, 5]
+
+
+@pytest.fixture(params=[1, 2, 3])
+def threads(request: pytest.FixtureRequest) -> Iterator[int]:
+    """How many threads the passes over text may take; one again at the end."""
+    _kernels.use_threads(request.param)
+    yield request.param
+    _kernels.use_threads(1)
+
+
+@pytest.mark.parametrize("gap", [" ", "\n", ", \r\n", " " * 3000])
+def test_long_texts_are_read_in_pieces(threads: int, gap: str, random: np.random.Generator) -> None:
+    """Pieces end anywhere: in words, between them, and in gaps that are longer than they are."""
+    expected = random.integers(-(10 ** random.integers(1, 9, 300_000 if len(gap) < 9 else 400)), 10**9)
+    data = (gap + gap.join(map(str, expected.tolist()))).encode()
+    for count in (1, 2, 77, len(expected) - 1, len(expected)):
+        values, end, bad = _kernels.scan_integers(data, 0, count)
+        assert (values.dtype.name, bad) == ("int32", -1)
+        np.testing.assert_array_equal(values, expected[:count])
+        spans = words(data, 0, count)
+        assert end == spans[-1, 1] == _kernels.behind_words(data, 0, count)
+        np.testing.assert_array_equal(integers_at(data, spans), expected[:count])
+        np.testing.assert_array_equal(numbers_at(data, spans, DOUBLE), expected[:count])
+    assert _kernels.behind_words(data, 0, len(expected) + 1) == -1
+    values, _, bad = _kernels.scan_integers(data, 0, len(expected) + 1)
+    assert (len(values), bad) == (len(expected), len(data))
+
+
+def test_the_first_bad_word_of_a_long_text_is_named(threads: int) -> None:
+    data = bytearray(b"123456 " * 200_000)
+    for at in (7 * 150_000, 7 * 90_001):
+        data[at : at + 3] = b"1.5"
+        values, end, bad = _kernels.scan_integers(bytes(data), 0, 200_000)
+        assert (len(values), end, bad) == (at // 7, at - 1, at)
+        _, row = _kernels.integers(bytes(data), words(bytes(data), 0, 200_000), False)
+        assert row == at // 7
+
+
+def test_integers_take_64_bits_where_they_need_them(threads: int) -> None:
+    for largest, dtype in ((2**31 - 1, "int32"), (2**31 + 1, "int64"), (2**62, "int64")):
+        values, _, bad = _kernels.scan_integers(b"1 " * 100_000 + str(-largest).encode(), 0, 100_001)
+        assert (values.dtype.name, int(values[-1]), bad) == (dtype, -largest, -1)
+
+
+def test_long_texts_are_written_in_pieces(threads: int, random: np.random.Generator) -> None:
+    values = random.random(100_000)
+    text, spans = _kernels.shortest(values, False, 0)
+    assert [text[a:b] for a, b in spans[:: len(spans) // 99].tolist()] == [
+        repr(value).encode() for value in values[:: len(spans) // 99].tolist()
+    ]
+    data = b"(x) " * len(values)
+    at = 4 * np.arange(len(values)) + 1
+    expected = b"".join(b"(" + text[a:b] + b") " for a, b in spans.tolist())
+    assert _kernels.replace(data, np.stack([at, at + 1], axis=1), text, spans) == expected
+    assert _kernels.replace(b"abc", np.empty((0, 2), dtype=np.int64), b"", np.empty((0, 2), dtype=np.int64)) == b"abc"

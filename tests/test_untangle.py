@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from typing import Literal
 
 import generate
 import numpy as np
@@ -84,14 +85,54 @@ def test_a_mesh_that_meets_the_target_is_left_alone(mesh: Mesh) -> None:
     assert untangle(held, threshold=80).after is held
 
 
-def test_smoothing_never_lowers_the_worst_quality_of_the_mesh(mesh: Mesh) -> None:
+@pytest.mark.parametrize("smooth", [12, "best"])
+def test_smoothing_never_lowers_the_worst_quality_of_the_mesh(mesh: Mesh, smooth: int | Literal["best"]) -> None:
     worst = -math.inf
-    for current, record in steps(tangle(mesh, 5, 0.3), plan("auto", smooth=12)):
-        if record.phase == SMOOTHING or record.inverted == 0:
+    for current, record in steps(tangle(mesh, 5, 0.3), plan("auto", smooth)):
+        if record.phase.startswith(SMOOTHING) or record.inverted == 0:
             now = evaluate("min_sine", current).min()
-            assert now >= worst * (1 - 1e-12)
+            assert now >= worst * (1 - 1e-11)
             worst = now
     assert math.degrees(math.asin(worst)) > 0.9 * summarise(mesh).min_angle
+
+
+@pytest.mark.parametrize("case", [(25, 2), (100, 8)])
+def test_the_best_smoothing_is_better_in_every_figure(mesh: Mesh, case: tuple[int, int]) -> None:
+    tangled = tangle(mesh, *case)
+    default, best = untangle(tangled), untangle(tangled, smooth="best")
+    one, two = summarise(default.after), summarise(best.after)
+    assert best.valid
+    assert two.min_angle >= one.min_angle * (1 - 1e-9)
+    assert two.mean_min_angle > one.mean_min_angle
+    assert two.percentile_1 > one.percentile_1
+    assert [r.phase for r in best.records][-1].startswith(SMOOTHING)
+    assert best.untangled.points.tobytes() == default.untangled.points.tobytes()
+
+
+def test_the_best_smoothing_goes_to_the_ceiling_or_to_where_nothing_rises(mesh: Mesh) -> None:
+    tangled = tangle(mesh)
+    best = untangle(tangled, smooth="best").after
+    top = ceiling(mesh)
+    assert top is not None
+    smallest = summarise(best).min_angle
+    assert smallest <= top * (1 + 1e-12)
+    if smallest < top * (1 - 1e-9):  # further sweeps do not help
+        again = untangle(best, smooth="best").after
+        assert summarise(again).min_angle < smallest + 0.5
+
+
+def test_the_best_smoothing_has_the_same_bits_for_any_number_of_threads(fine: Mesh) -> None:
+    tangled = tangle(fine)
+    outcomes = [untangle(tangled, smooth="best", threads=threads) for threads in (1, 2, 3)]
+    assert len({o.after.points.tobytes() for o in outcomes}) == 1
+
+
+def test_the_best_smoothing_of_a_valid_mesh_is_not_held_back_by_the_threshold(mesh: Mesh) -> None:
+    assert untangle(mesh, threshold=1).after is mesh
+    best = untangle(mesh, threshold=1, smooth="best")
+    assert best.valid
+    assert summarise(best.after).mean_min_angle > summarise(mesh).mean_min_angle
+    assert summarise(best.after).min_angle >= summarise(mesh).min_angle * (1 - 1e-9)
 
 
 def test_smoothing_reaches_the_ceiling_that_fixed_vertices_set(bracket: Mesh) -> None:

@@ -159,6 +159,22 @@ auto summarise_py(const PyConnectivity& self, const Matrix<const double>& points
                            to_numpy(std::move(total.inverted)), total.folded, total.min_measure, total.largest);
 }
 
+auto mean_ratio_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+                   const Vector<const double>& x) {
+    const std::size_t d = neighbours.shape(1);
+    auto [value, again, gradient, hessian] = with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        const Star<D> star = make_star<D>(neighbours, faces, x.data());
+        const MeanRatio<D> ratio(star, star.position);
+        std::vector<double> rows;
+        for (int i = 0; i < D; ++i)
+            for (int j = 0; j < D; ++j) rows.push_back(ratio.hessian[std::max(i, j)][std::min(i, j)]);
+        return std::make_tuple(ratio.value, MeanRatio<D>::at(star, star.position),
+                               std::vector<double>(ratio.gradient.begin(), ratio.gradient.end()), rows);
+    });
+    return std::make_tuple(value, again, to_numpy(std::move(gradient)), to_numpy(std::move(hessian), d));
+}
+
 // Where two arrays of points differ.
 auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after) {
     if (before.size() != after.size()) throw nb::value_error("the points are of two meshes");
@@ -496,6 +512,7 @@ NB_MODULE(_kernels, m) {
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
     m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
     m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);

@@ -107,8 +107,8 @@ def relocate(
 ) -> tuple[int, int]:
     """Relocate, in place, the vertices to visit (n,) of some blocks of one colour; the numbers visited and moved.
 
-    The threshold is that of the active-set method, or the floor of MEAN_RATIO. Smoothing makes no measure smaller than
-    `min_measure`, no vertex goes farther than `max_move` from `start`.
+    The threshold is that of the active-set method, or the floor of MEAN_RATIO and MEAN_ANGLE. Smoothing makes no
+    measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
 def linear_program(
@@ -136,6 +136,9 @@ def min_norm_point(vectors: Float64) -> Float64:
 
 def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[Float64, Float64, float]:
     """Sines of a star, their gradients, and sign * (smallest sine)^2 (-1 where the star is not valid)."""
+
+def mean_angle(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, list[float]]:
+    """Sum of sin - cos of the smallest angles of a star's simplices, and its gradient (d,)."""
 
 def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, float, Float64, Float64]:
     """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""

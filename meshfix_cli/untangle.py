@@ -26,7 +26,9 @@ SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
 SMOOTH = 3  # section 4: three passes of smoothing
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
-MEAN_SWEEPS = 4  # of the mean ratio: later ones gain less than a hundredth of a degree
+RATIO_SWEEPS = 2  # of "best": later ones gain little
+ANGLE_SWEEPS = 3
+FLOOR = 1  # percentile of the smallest angles: the sweeps for the mean angle let no element fall below it
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
 RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
 RAISE_PATIENCE = 2
@@ -46,6 +48,7 @@ class Move(IntEnum):
     UNTANGLE_HEIGHTS = 5
     MEAN_RATIO = 6
     RAISE_SMALLEST = 7
+    MEAN_ANGLE = 8
 
 
 @dataclass(frozen=True)
@@ -108,9 +111,10 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
 }
 
 
-# After the passes at the threshold: the mean, then the few stars that are below the ceiling.
+# After the passes at the threshold: what makes angles regular, the mean angle, then the few that are below the ceiling.
 _BEST = (
-    Phase(f"{SMOOTHING} the mean", (Move.MEAN_RATIO,), MEAN_SWEEPS, until="settled"),
+    Phase(f"{SMOOTHING} the mean ratio", (Move.MEAN_RATIO,), RATIO_SWEEPS, until="settled"),
+    Phase(f"{SMOOTHING} the mean angle", (Move.MEAN_ANGLE,), ANGLE_SWEEPS, until="settled"),
     Phase(f"{SMOOTHING} the worst", (Move.RAISE_SMALLEST,), until="ceiling"),
 )
 
@@ -362,9 +366,7 @@ class _Run:
         return self.free & self.stars.grown(vertices, rings).view(bool)
 
     def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
-        threshold, visited = self.threshold_sine2, near
-        if Move.MEAN_RATIO in phase.moves:
-            threshold = max(threshold, self._min_sine2(self.mendable))
+        threshold, visited = self._threshold_sine2(phase), near
         for move in cycle(phase.moves):
             if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
                 visited = near & (self._broken() | self._grown(self.changed, 1))
@@ -390,6 +392,18 @@ class _Run:
                 self.reach.distance, self.threads,
             )  # fmt: skip
         return points
+
+    def _threshold_sine2(self, phase: Phase) -> float:
+        """Return that of the user or, for the means, the floor below which nothing may fall, if that is higher."""
+        floor = 0.0
+        if Move.MEAN_RATIO in phase.moves:
+            floor = self._min_sine2(self.mendable)
+        elif Move.MEAN_ANGLE in phase.moves:
+            import numpy as np
+
+            smallest = _kernels.angles(self.points, self.mendable, self.threads)[0]
+            floor = math.sin(np.percentile(smallest, FLOOR)) ** 2
+        return max(self.threshold_sine2, floor)
 
     def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
         """Return the smallest sine^2; 1: there are no simplices, 0: one is not valid."""
@@ -440,8 +454,9 @@ def untangle(
     strategy : str
         A key of `STRATEGIES`.
     smooth : int or "best"
-        Smoothing passes. "best": `SMOOTH` of them, `MEAN_SWEEPS` sweeps for the mean ratios of all stars, and sweeps
-        that raise the smallest angle until it is that of the simplices without a free vertex or rises no more.
+        Smoothing passes. "best": `SMOOTH` of them, `RATIO_SWEEPS` sweeps for the mean ratios, `ANGLE_SWEEPS` for the
+        smallest angles of all simplices, and sweeps that raise the smallest of all until it is that of the simplices
+        without a free vertex or rises no more.
     sweeps, threshold, max_move, only_invalid
         See `steps`.
     threads : int

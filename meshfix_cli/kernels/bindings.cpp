@@ -4,6 +4,7 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include <numeric>
 #include <variant>
@@ -173,6 +174,18 @@ auto mean_ratio_py(const Matrix<const double>& neighbours, const Matrix<const st
                                std::vector<double>(ratio.gradient.begin(), ratio.gradient.end()), rows);
     });
     return std::make_tuple(value, again, to_numpy(std::move(gradient)), to_numpy(std::move(hessian), d));
+}
+
+auto mean_angle_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+                   const Vector<const double>& x) {
+    return with_dimension(neighbours.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const Star<D> star = make_star<D>(neighbours, faces, x.data());
+        MeanAngle<D> angle;
+        angle.allowed.assign(star.blocks.size(), constant<Pack>(1.0));
+        const Vec<D> slope = MeanAngle<D>::slope(star, star.position);
+        return std::make_pair(angle.at(star, star.position), std::vector<double>(slope.begin(), slope.end()));
+    });
 }
 
 // Where two arrays of points differ.
@@ -512,6 +525,7 @@ NB_MODULE(_kernels, m) {
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.def("mean_angle", &mean_angle_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
     m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
@@ -553,5 +567,5 @@ NB_MODULE(_kernels, m) {
         .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
     m.attr("BLOCK_SIZE") = BLOCK_SIZE;
 
-    static_assert(static_cast<int>(Move::raise_smallest) == 7, "the codes of untangle.Move");
+    static_assert(static_cast<int>(Move::mean_angle) == 8, "the codes of untangle.Move");
 }

@@ -1,26 +1,20 @@
-// Smoothing of the mean: Newton's method for the sum of the inverse mean ratios of a star, raised to a power that
-// makes bad simplices count more, without lowering its smallest sine below a floor.
+// Smoothing of the mean ratio: Newton's method for the sum of its inverse over a star, raised to the power D so that bad
+// simplices count more, without lowering the smallest sine below a floor.
 //
 // The inverse mean ratio of a simplex is S / det^(2/D) but for a constant, S the sum of its squared edges; it is
-// smallest where the simplex is regular and goes to infinity where it is flat. The powers, 2 in 2-D and 9/4 in 3-D, take
-// nothing but square roots. Source: P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
+// smallest where the simplex is regular and goes to infinity where it is flat. Its power D, S^D / det^2, takes no roots.
+// Source: P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
 #pragma once
 
 #include "sines.hpp"
 
 namespace meshfix {
 
-constexpr double mean_ratio_power(int d) { return d == 2 ? 2.0 : 2.25; }
-
-template <class T>
-inline T powered_ratio(const Edges<2, T>&, T edges2, T det) {
-    const T ratio = edges2 / det;
-    return ratio * ratio;
-}
-template <class T>
-inline T powered_ratio(const Edges<3, T>&, T edges2, T det) {
-    const T root = square_root(edges2 * edges2 * edges2 / (det * det));
-    return root * square_root(root);
+template <int D, class T>
+inline T powered_ratio(T edges2, T det) {
+    T power = edges2;
+    for (int k = 1; k < D; ++k) power = power * edges2;
+    return power / (det * det);
 }
 
 template <int D, class T>
@@ -43,21 +37,6 @@ inline Vec<3, T> determinant_slope(const Edges<3, T>& e) {
     return cross(e[2] - e[0], e[1] - e[0]);
 }
 
-inline double sum_of_lanes(Pack p) {
-    double sum = 0.0;
-    for (int i = 0; i < LANES; ++i) sum += p[i];
-    return sum;
-}
-
-// 1 for the faces of a block, 0 for what fills up the last one.
-template <int D>
-Pack weights(const Star<D>& star, std::size_t block) {
-    Pack w = constant<Pack>(1.0);
-    for (int i = 0; i < LANES; ++i)
-        if (static_cast<int>(block) * LANES + i >= star.faces_count) w[i] = 0.0;
-    return w;
-}
-
 template <int D>
 struct MeanRatio {
     double value = 0.0;
@@ -71,16 +50,16 @@ struct MeanRatio {
             const auto e = star.edges(star.blocks[b], x);
             const Pack det = determinant(e);
             smallest = smaller(smallest, det);
-            sum += weights(star, b) * powered_ratio(e, sum_of_squared_edges<D>(e), det);
+            sum += star.weights(b) * powered_ratio<D>(sum_of_squared_edges<D>(e), det);
         }
         for (int i = 0; i < LANES; ++i)
             if (!(smallest[i] > 0.0)) return INFINITY;
         return sum_of_lanes(sum);
     }
 
-    // With derivatives: f = r^p, log r = log S - 2/D log det.
+    // With derivatives: f = r^D, log r = log S - 2/D log det.
     MeanRatio(const Star<D>& star, const Vec<D>& x) {
-        constexpr double p = mean_ratio_power(D);
+        constexpr double p = D;
         Pack sum = constant<Pack>(0.0);
         Vec<D, Pack> slope;
         std::array<Vec<D, Pack>, D> curvature;
@@ -91,7 +70,7 @@ struct MeanRatio {
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto e = star.edges(star.blocks[b], x);
             const Pack edges2 = sum_of_squared_edges<D>(e), det = determinant(e);
-            const Pack f = weights(star, b) * powered_ratio(e, edges2, det), pf = p * f;
+            const Pack f = star.weights(b) * powered_ratio<D>(edges2, det), pf = p * f;
             Vec<D, Pack> outward = e[0];
             for (int k = 1; k < D; ++k) outward = outward + e[k];
             const Vec<D, Pack> s = (constant<Pack>(-2.0) / edges2) * outward;
@@ -141,14 +120,14 @@ struct MeanRatio {
 };
 
 // From a valid position to one of a smaller sum whose smallest sine^2 is not below the floor, nor, where that of the
-// star is below it, smaller than it was.
-template <int D>
-Vec<D> improve_mean(const Star<D>& star, double quality, double floor) {
+// star is below it, smaller than it was. `reachable` gives the position to which a step can go.
+template <int D, class F>
+Vec<D> improve_mean_ratio(const Star<D>& star, double quality, double floor, const F& reachable) {
     const MeanRatio<D> here(star, star.position);
-    const double least = std::min(quality, floor) * (1.0 - NEWTON_EQUAL);  // `min_sine2` wants more than its floor
+    const double least = std::min(quality, floor) * (1.0 - SAME_SINE2);  // `min_sine2` wants more than its floor
     Vec<D> step = here.step(star.radius);
     for (int trial = 0; trial < NEWTON_TRIALS; ++trial, step = 0.5 * step) {
-        const Vec<D> x = star.snap(star.position + step);
+        const Vec<D> x = reachable(star.position + step);
         if (MeanRatio<D>::at(star, x) < here.value && min_sine2<D>(star, x, least) > 0.0) return x;
     }
     return star.position;

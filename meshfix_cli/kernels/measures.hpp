@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "parallel.hpp"
+#include "angles.hpp"
 #include "sines.hpp"
 
 namespace meshfix {
@@ -18,68 +19,6 @@ Edges<D> edges_of(const double* points, const std::int32_t* simplex) {
     Edges<D> e;
     for (int k = 0; k < D; ++k) e[k] = load<D>(points + static_cast<std::int64_t>(simplex[k + 1]) * D) - first;
     return e;
-}
-
-// The cosines of the angles; NaN, or beyond 1, where an edge or triangle has no size.
-template <class T>
-std::array<T, 3> cosines(const Edges<2, T>& e) {
-    const std::array<Vec<2, T>, 3> sides{e[0], e[1] - e[0], constant<T>(-1.0) * e[1]};
-    std::array<T, 3> inverse;
-    for (int i = 0; i < 3; ++i) inverse[i] = constant<T>(1.0) / square_root(norm2(sides[i]));
-    std::array<T, 3> result;
-    for (int i = 0; i < 3; ++i)
-        result[i] = constant<T>(-1.0) * dot(sides[i], sides[(i + 2) % 3]) * inverse[i] * inverse[(i + 2) % 3];
-    return result;
-}
-
-// Outward normals of the faces opposite the vertices 0 to 3, or all inward; the edge between faces i and j joins
-// the two other vertices.
-template <class T>
-std::array<Vec<3, T>, 4> normals(const Edges<3, T>& e) {
-    const Vec<3, T>&A = e[0], &B = e[1], &C = e[2];
-    return {cross(B - A, C - A), cross(C, B), cross(A, C), cross(B, A)};
-}
-constexpr std::array<std::array<int, 2>, 6> FACES_AT_EDGE{{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
-
-template <class T>
-std::array<T, 6> cosines(const Edges<3, T>& e) {
-    const auto n = normals(e);
-    std::array<T, 4> inverse;
-    for (int i = 0; i < 4; ++i) inverse[i] = constant<T>(1.0) / square_root(norm2(n[i]));
-    std::array<T, 6> result;
-    for (int k = 0; k < 6; ++k) {
-        const auto [i, j] = FACES_AT_EDGE[k];
-        result[k] = constant<T>(-1.0) * dot(n[i], n[j]) * inverse[i] * inverse[j];
-    }
-    return result;
-}
-
-// The sine of one of these angles.
-inline double sine_of(const Edges<2>& e, std::size_t i) {
-    const std::array<Vec<2>, 3> sides{e[0], e[1] - e[0], -1.0 * e[1]};
-    return std::fabs(determinant(e)) / (std::sqrt(norm2(sides[i])) * std::sqrt(norm2(sides[(i + 2) % 3])));
-}
-inline double sine_of(const Edges<3>& e, std::size_t k) {
-    const auto n = normals(e);
-    const auto [i, j] = FACES_AT_EDGE[k];
-    const std::array<Vec<3>, 6> along{e[2] - e[1], e[2] - e[0], e[1] - e[0], e[2], e[1], e[0]};
-    return std::fabs(determinant(e)) * std::sqrt(norm2(along[k])) / (std::sqrt(norm2(n[i])) * std::sqrt(norm2(n[j])));
-}
-
-// Smallest and largest angle, with atan2 of sine and cosine: acos alone loses half the digits near 0 and 180 degrees.
-struct AngleRange {
-    double smallest, largest;
-};
-
-template <int D>
-AngleRange angles(const Edges<D>& e) {
-    const auto c = cosines(e);
-    for (double x : c)
-        if (!(std::fabs(x) < 2.0)) return {0.0, std::acos(-1.0)};  // an edge or triangle of size zero
-    const auto at = [&](auto found) {
-        return std::atan2(sine_of(e, static_cast<std::size_t>(found - c.begin())), *found);
-    };
-    return {at(std::max_element(c.begin(), c.end())), at(std::min_element(c.begin(), c.end()))};
 }
 
 // Calls f(s, edges, range of angles) for the simplices from `begin` to `end`, LANES at a time, by acos where it is exact.
@@ -95,7 +34,7 @@ void for_each_angles(const double* points, const std::int32_t* simplices, std::i
             for (int k = 0; k < D; ++k)
                 for (int x = 0; x < D; ++x) lanes[k][x][i] = e[i][k][x];
         }
-        const auto c = cosines(lanes);
+        const auto c = cosines<D>(lanes);
         Pack largest = c[0], smallest = c[0], sum = constant<Pack>(0.0);
         for (const Pack& x : c) {
             largest = larger(largest, x);

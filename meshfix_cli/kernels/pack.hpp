@@ -76,6 +76,12 @@ inline Pack square_root(Pack p) {
     return p;
 }
 
+inline double sum_of_lanes(Pack p) {
+    double sum = 0.0;
+    for (int i = 0; i < LANES; ++i) sum += p[i];
+    return sum;
+}
+
 template <class T>
 inline T smaller(T a, T b) {
     return select(a < b, a, b);

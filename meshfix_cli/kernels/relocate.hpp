@@ -5,6 +5,7 @@
 #include "active_set.hpp"
 #include "laplacian.hpp"
 #include "linear_program.hpp"
+#include "mean_angle.hpp"
 #include "mean_ratio.hpp"
 #include "order.hpp"
 #include "parallel.hpp"
@@ -12,11 +13,12 @@
 namespace meshfix {
 
 enum class Move : int {
-    laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest
+    laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
+    mean_angle
 };
 
 struct Parameters {
-    double threshold_sine2;  // the active-set method runs on stars below it; mean_ratio: the floor
+    double threshold_sine2;  // the active-set method runs on stars below it; for the means: the floor
     double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
     const double* start;     // (n, D): where the vertices came from
     double max_move;         // how far from there they may be; infinity: anywhere
@@ -35,6 +37,7 @@ struct Relocation {
     Star<D> star{};
     LinearProgram<D> program{};
     ActiveSet<D> active_set{};
+    MeanAngle<D> mean_angle{};
 
     bool store(std::int64_t v, Vec<D> x) {
         if (parameters.max_move < INFINITY) x = within_reach(v, x);
@@ -81,7 +84,7 @@ struct Relocation {
     // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
     bool combined_untangle(std::int64_t v) {
         const bool moved = store(v, star.origin);
-        star.position = (1.0 / star.unit) * (load<D>(points + v * D) - star.origin);
+        star.position = star.to_local(load<D>(points + v * D));
         return (star.valid(star.position) ? false : untangle(v)) || moved;
     }
 
@@ -100,9 +103,15 @@ struct Relocation {
         return take(v, smoothed(quality, true));
     }
 
-    bool smooth_mean(std::int64_t v) {
-        const double quality = min_sine2<D>(star, star.position, 0.0);
-        return quality > 0.0 && take(v, improve_mean<D>(star, quality, parameters.threshold_sine2));
+    bool smooth_mean(std::int64_t v, bool angle) {
+        const double quality = min_sine2<D>(star, star.position, 0.0), floor = parameters.threshold_sine2;
+        if (!(quality > 0.0)) return false;
+        const auto reachable = [&](const Vec<D>& x) {
+            const Vec<D> there = star.to_global(x);
+            return star.to_local(parameters.max_move < INFINITY ? within_reach(v, there) : there);
+        };
+        return take(v, angle ? mean_angle.improve(star, quality, floor, reachable)
+                             : improve_mean_ratio<D>(star, quality, floor, reachable));
     }
 
     Vec<D> smoothed(double quality, bool optimise) {
@@ -152,8 +161,9 @@ struct Relocation {
             case Move::smart_laplacian: counts.moved += smooth(v, false); break;
             case Move::combined_smooth: counts.moved += smooth(v, true); break;
             case Move::untangle_heights: counts.moved += untangle_heights(v); break;
-            case Move::mean_ratio: counts.moved += smooth_mean(v); break;
+            case Move::mean_ratio: counts.moved += smooth_mean(v, false); break;
             case Move::raise_smallest: counts.moved += raise_smallest(v); break;
+            case Move::mean_angle: counts.moved += smooth_mean(v, true); break;
             case Move::laplacian: break;
         }
     }

@@ -79,10 +79,19 @@ struct Star {
         }
     }
 
+    // 1 for the faces of a block, 0 for what fills up the last one.
+    Pack weights(std::size_t block) const {
+        Pack w = constant<Pack>(1.0);
+        for (int i = 0; i < LANES; ++i)
+            if (static_cast<int>(block) * LANES + i >= faces_count) w[i] = 0.0;
+        return w;
+    }
+
     Vec<D> to_global(const Vec<D>& x) const { return origin + unit * x; }
+    Vec<D> to_local(const Vec<D>& p) const { return (1.0 / unit) * (p - origin); }
 
     // The nearest position that the global coordinates can hold: what is judged is what will be stored.
-    Vec<D> snap(const Vec<D>& x) const { return (1.0 / unit) * (to_global(x) - origin); }
+    Vec<D> snap(const Vec<D>& x) const { return to_local(to_global(x)); }
 
     // Edges from x to the vertices of face i, and of all faces of a block.
     Edges<D> edges(int i, const Vec<D>& x) const {

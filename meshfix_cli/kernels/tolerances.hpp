@@ -30,10 +30,12 @@ constexpr double ACTIVE_MIN_GAIN = 1e-4;  // stopping rule 3
 constexpr double ACTIVE_KKT = 1e-6;       // stopping rule 4: length of the steepest ascent direction
 constexpr double ACTIVE_ACCEPT = 0.9;     // share of the predicted gain at which a step is taken
 
-// Newton's method for the mean ratio.
-constexpr double NEWTON_PIVOT = 1e-8;   // of a diagonal element: below it the sum counts as not convex
-constexpr double NEWTON_EQUAL = 1e-12;  // by which a smallest sine^2 may differ and count as the same
-constexpr int NEWTON_TRIALS = 5;        // steps, each half as long as the one before
+// Smoothing of the mean ratio and of the mean angle.
+constexpr double SAME_SINE2 = 1e-12;   // by which a smallest sine^2 may differ and count as the same
+constexpr double NEWTON_PIVOT = 1e-8;  // of a diagonal element: below it the sum of mean ratios counts as not convex
+constexpr int NEWTON_TRIALS = 5;       // steps, each half as long as the one before
+constexpr double ASCENT_STEP = 0.16;   // first step for the mean angle, in star radii
+constexpr int ASCENT_TRIALS = 6;
 
 // Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:
 // files of six digits, or in single precision, make facets that only touch interpenetrate by less.

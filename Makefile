@@ -57,12 +57,13 @@ fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format
 stress: $(VENV)/installed ## untangle 259 hard cases; which are solved, how fast and how well
 	$(BIN)/python benchmarks/stress.py
 
-bench: $(VENV)/installed ## microseconds per vertex of each kernel; MESH=FILE for a mesh of yours; seconds to write files
+bench: $(VENV)/installed ## kernels, with MESH=FILE for a mesh of yours; the whole process up to 10 million tets; files
 	$(BIN)/python benchmarks/kernels.py $(MESH)
+	$(BIN)/python benchmarks/process.py
 	$(BIN)/python benchmarks/files.py
 
-compare: $(VENV)/developer ## beside gmsh's UntangleMeshGeometry; MESH=FILE for a valid mesh of yours
-	$(BIN)/python benchmarks/compare.py $(MESH)
+compare: $(VENV)/developer ## beside gmsh's UntangleMeshGeometry; MESH=FILE or TETS=1000000 for a larger mesh
+	$(BIN)/python benchmarks/compare.py $(MESH) $(if $(TETS),--tets $(TETS))
 
 tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)

@@ -1,7 +1,8 @@
-"""Microseconds per vertex of each move: `make bench`, or `python benchmarks/kernels.py [MESH]`.
+"""Nanoseconds per vertex of each move: `make bench`, or `python benchmarks/kernels.py [MESH]`.
 
 One thread; the best of several runs, each from the same positions. LP and Laplacian steps start from a perturbed
-mesh, smoothing steps from the mesh that one untangling has made of it, as in use.
+mesh, smoothing steps from the mesh that one untangling has made of it, as in use. Beside them the bound that memory
+sets: the bytes that a sweep must read and write, each once, at the speed of a copy of large arrays in the same run.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
@@ -22,10 +24,30 @@ from meshfix_cli.untangle import THRESHOLD, Move
 sys.path.insert(0, str(Path(__file__).parents[1] / "sample_meshes"))
 import generate
 
-TARGETS = {Move.LAPLACIAN: 0.05, Move.UNTANGLE: 1.5, Move.COMBINED_SMOOTH: 1.5}  # in 3-D, microseconds
+TARGETS = {Move.LAPLACIAN: 50, Move.UNTANGLE: 1500, Move.COMBINED_SMOOTH: 1500}  # in 3-D, nanoseconds
 
 
-def microseconds(mesh: Mesh, move: Move, repeats: int) -> float:
+def bytes_per_nanosecond(repeats: int) -> float:
+    """Return how fast large arrays are copied, reading and writing counted."""
+    source = np.ones(1 << 24)
+    target, best = np.zeros_like(source), math.inf
+    for _ in range(repeats):
+        start = time.perf_counter()
+        np.copyto(target, source)
+        best = min(best, time.perf_counter() - start)
+    return 2 * source.nbytes / best * 1e-9
+
+
+def bytes_per_vertex(mesh: Mesh, move: Move) -> float:
+    """Return what a sweep reads and writes: positions twice, lists of neighbours and, but for one move, of faces."""
+    stars = mesh.topology.stars()
+    listed = stars.neighbours.nbytes + stars.neighbour_offsets.nbytes
+    if move is not Move.LAPLACIAN:
+        listed += stars.faces.nbytes + stars.offsets.nbytes
+    return (2 * mesh.points.nbytes + listed) / len(stars.vertices)
+
+
+def nanoseconds(mesh: Mesh, move: Move, repeats: int) -> float:
     """Return the best time per visited vertex."""
     threshold = math.sin(math.radians(THRESHOLD[mesh.dimension])) ** 2
     stars, best = mesh.topology.stars(), math.inf
@@ -38,7 +60,7 @@ def microseconds(mesh: Mesh, move: Move, repeats: int) -> float:
                 move, points, movable, stars, blocks, threshold, -math.inf, start_points, math.inf, 1
             )[0]
         best = min(best, (time.perf_counter() - start) / max(visited, 1))
-    return best * 1e6
+    return best * 1e9
 
 
 def main() -> None:
@@ -49,7 +71,9 @@ def main() -> None:
     options = parser.parse_args()
     meshes = [read(options.mesh).mesh] if options.mesh else []
     meshes = meshes or [Mesh.build(*generate.plate(0.012)), Mesh.build(*generate.bracket(0.045, 12))]
-    table = Table("step", "mesh", "us per vertex", "target", title="kernels, one thread")
+    speed = bytes_per_nanosecond(options.repeats)
+    title = f"kernels, one thread; memory copies {speed:.1f} GB/s"
+    table = Table("step", "mesh", "ns per vertex", "bound by memory", "target", title=title)
     for mesh in meshes:
         tangled, _ = perturb(mesh, 25, mesh.mean_edge_length())
         outcome = untangle(tangled, smooth=0)
@@ -57,8 +81,8 @@ def main() -> None:
         for move in Move:
             start = tangled if move <= Move.COMBINED_UNTANGLE else outcome.after
             target = TARGETS.get(move) if mesh.dimension == 3 else None
-            figure = f"{microseconds(start, move, options.repeats):.3f}"
-            table.add_row(move.name.lower(), name, figure, f"{target:g}" if target else "")
+            figures = (nanoseconds(start, move, options.repeats), bytes_per_vertex(mesh, move) / speed)
+            table.add_row(move.name.lower(), name, *(f"{one:.0f}" for one in figures), f"{target or ''}")
     Console(width=100).print(table)
 
 

@@ -9,10 +9,12 @@ from pathlib import Path
 import compare
 import generate
 import kernels
+import process
 import pytest
 import stress
 import tables
 from conftest import SAMPLES
+from phases import PHASES
 
 from meshfix_cli.untangle import Move
 
@@ -38,6 +40,15 @@ def test_kernels_are_timed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captu
     kernels.main()
     printed = capsys.readouterr().out
     assert all(move.name.lower() in printed for move in Move)
+    assert "GB/s" in printed
+
+
+def test_the_process_is_timed_in_phases(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", ["process.py", "--tets", "3000", "--repeats", "1"])
+    process.main()
+    printed = capsys.readouterr().out
+    assert all(phase in printed for phase in PHASES)
+    assert printed.count(" / ") == 6
 
 
 def test_samples_are_what_the_script_makes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,5 +89,8 @@ def test_comparison_with_gmsh(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     monkeypatch.setattr(sys, "argv", ["compare.py", str(SAMPLES / "plate.vtk")])
     compare.main()
     printed = capsys.readouterr().out
-    assert printed.count("gmsh, unit edges") == printed.count("meshfix") - 1 == 4
+    assert printed.count("gmsh, unit edges") == printed.count("meshfix, best") == 4
     assert "error" not in printed
+    monkeypatch.setattr(sys, "argv", ["compare.py", "--tets", "3000"])
+    compare.main()
+    assert capsys.readouterr().out.count("box with holes, P=10 D=1h") == 4

@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "meshfix_cli"
 
 ALLOWED = {
+    "_kernels": {"_kernels_any"},
     "errors": set(),
     "mesh": {"_kernels", "errors"},
     "quality": {"_kernels", "mesh"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
+from typing import Any
 
 import generate
 import numpy as np
@@ -223,6 +224,36 @@ def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move
     assert expected != start.points.tobytes()
     for threads, rotate in ((1, 1), (2, 0), (2, 2), (3, 0), (3, 1)):
         assert relocated(start, move, threads, rotate) == expected
+
+
+def built_for(name: str) -> Any:
+    """Another build of the kernels; skips where this processor, or the compiler, has not what it takes."""
+    module = pytest.importorskip(f"meshfix_cli.{name}")
+    return module if name == "_kernels_any" or module.has_avx2() else pytest.skip("there is no AVX2 here")
+
+
+@pytest.mark.parametrize("move", list(Move))
+@pytest.mark.parametrize("case", ["usual", "hard", "collapsed"])
+def test_builds_for_wider_vectors_give_the_same_bits(mesh: Mesh, move: Move, case: str) -> None:
+    start = {"usual": tangle(mesh, 5, 0.3), "hard": tangle(mesh, 100, 8), "collapsed": collapsed(mesh)}[case]
+    simplices, movable, results = start.topology.simplices, np.ascontiguousarray(start.movable), []
+    for kernels in (built_for("_kernels_any"), built_for("_kernels_avx2")):
+        used = kernels.used_vertices(simplices, start.topology.n)
+        own = kernels.Connectivity(start.points, simplices, used, 1)
+        own.build_stars(1)
+        points = start.points[own.vertices]
+        reference, visited = points.copy(), movable[own.vertices]
+        for blocks in np.split(own.colour_blocks, own.colour_offsets[1:-1]):
+            kernels.relocate(move, points, visited, own, blocks, 0.07, -math.inf, reference, math.inf, 1)
+        summary = own.summarise(points, 12, 0.1, 1)
+        results.append((points.tobytes(), *(np.asarray(value).tobytes() for value in summary)))
+    assert results[0] == results[1]
+
+
+def collapsed(mesh: Mesh) -> Mesh:
+    points = mesh.points.copy()
+    points[mesh.movable] = points[mesh.movable].mean(axis=0)
+    return mesh.with_points(points)
 
 
 def test_only_movable_vertices_move(mesh: Mesh) -> None:

@@ -16,7 +16,7 @@ struct ActiveSet {
         for (int step = 0; step < ACTIVE_MAX_STEPS; ++step) {  // rule 2
             const double value = std::sqrt(quality);
             sines<D>(star, x, functions);
-            const Vec<D> ascent = ascent_direction(value);
+            const Vec<D> ascent = ascent_direction(star, value);
             const double slope = std::sqrt(norm2(ascent));
             if (!(slope > ACTIVE_KKT)) break;  // rule 4
             const Vec<D> direction = (1.0 / slope) * ascent;
@@ -29,13 +29,16 @@ struct ActiveSet {
 
    private:
     // The smallest convex combination of the active gradients: every active function rises along it.
-    Vec<D> ascent_direction(double value) {
+    Vec<D> ascent_direction(const Star<D>& star, double value) {
         gradients.clear();
-        for (const auto& f : functions) {
-            for (int i = 0; i < LANES; ++i) {
-                if (f.value[i] > value + ACTIVE) continue;
+        constexpr int PER_FACE = functions_per_simplex(D);
+        for (int face = 0; face < star.faces_count; ++face) {  // in their order, however they are packed
+            for (int k = 0; k < PER_FACE; ++k) {
+                const auto& f = functions[face / LANES * PER_FACE + k];
+                const int lane = face % LANES;
+                if (f.value[lane] > value + ACTIVE) continue;
                 Vec<D> gradient;
-                for (int k = 0; k < D; ++k) gradient[k] = f.gradient[k][i];
+                for (int c = 0; c < D; ++c) gradient[c] = f.gradient[c][lane];
                 gradients.push_back(gradient);
             }
         }

@@ -510,7 +510,15 @@ nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& sp
 
 }  // namespace
 
-NB_MODULE(_kernels, m) {
+// Built once for any processor and, where the compiler can, once for those with wider vectors; see _kernels.py.
+#define MODULE(name, variable) NB_MODULE(name, variable)
+MODULE(MESHFIX_MODULE, m) {
+#if defined(__x86_64__) && defined(__GNUC__)
+    m.def("has_avx2", [] { return __builtin_cpu_supports("avx2") != 0; });
+#else
+    m.def("has_avx2", [] { return false; });
+#endif
+    m.attr("LANES") = LANES;
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);

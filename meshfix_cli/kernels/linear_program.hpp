@@ -39,6 +39,7 @@ struct LinearProgram {
     std::array<int, D + 1> basis{};
     std::array<Column, D + 1> inverse{};  // rows
     Column pi{};                          // (x, t)
+    int faces = 0;  // without those that fill up the last block
     int pivots = 0;
 
     // Takes the columns from a star; `heights`: divided by |n_i|.
@@ -46,6 +47,7 @@ struct LinearProgram {
         normals.resize(star.blocks.size());
         costs.resize(star.blocks.size());
         box = LP_BOX * star.radius;
+        faces = star.faces_count;
         faces_count = static_cast<int>(star.blocks.size()) * LANES;
         set_frame(star.neighbours);
         Pack shortest = constant<Pack>(INFINITY), longest = constant<Pack>(0.0);
@@ -78,9 +80,9 @@ struct LinearProgram {
     LpStatus solve() {
         pivots = 0;
         start();
-        const int limit = LP_MAX_PIVOTS + 10 * faces_count;
+        const int limit = LP_MAX_PIVOTS + 10 * faces;
         for (; pivots < limit; ++pivots) {
-            const bool bland = pivots >= LP_BLAND_AFTER + faces_count;
+            const bool bland = pivots >= LP_BLAND_AFTER + faces;
             price();
             const int entering = choose_entering(LP_PRICING * largest_cost, bland);
             if (entering < 0) return finish();
@@ -250,9 +252,10 @@ struct LinearProgram {
         int entering = 0;
         double smallest = INFINITY;
         for (int i = 0; i < LANES; ++i) {
-            if (!(best[i] < smallest)) continue;
+            const int j = static_cast<int>(at[i]) * LANES + i;
+            if (!(best[i] < smallest || (best[i] == smallest && j < entering))) continue;  // however they are packed
             smallest = best[i];
-            entering = static_cast<int>(at[i]) * LANES + i;
+            entering = j;
         }
         for (int k = 0; k < D; ++k) {
             const double reduced = box - std::fabs(pi[k]);

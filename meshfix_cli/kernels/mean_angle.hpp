@@ -42,14 +42,14 @@ struct MeanAngle {
 
     // The sum at x; -infinity where a simplex has a larger cosine than it may.
     double at(const Star<D>& star, const Vec<D>& x) const {
-        Pack sum = constant<Pack>(0.0);
+        LaneSum sum;
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const Pack cosine = largest_cosine(star, b, x);
             for (int i = 0; i < LANES; ++i)
                 if (!(cosine[i] <= allowed[b][i])) return -INFINITY;
-            sum += star.weights(b) * angle(cosine);
+            sum.add(b, star.weights(b) * angle(cosine));
         }
-        return sum_of_lanes(sum);
+        return sum.total();
     }
 
     // From a valid position to one of a larger sum; `floor` and `quality` as for the mean ratio.

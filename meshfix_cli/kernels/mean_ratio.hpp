@@ -45,28 +45,25 @@ struct MeanRatio {
 
     // The sum over a star at x; infinite where a determinant is not positive.
     static double at(const Star<D>& star, const Vec<D>& x) {
-        Pack sum = constant<Pack>(0.0), smallest = constant<Pack>(1.0);
+        LaneSum sum;
+        Pack smallest = constant<Pack>(1.0);
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto e = star.edges(star.blocks[b], x);
             const Pack det = determinant(e);
             smallest = smaller(smallest, det);
-            sum += star.weights(b) * powered_ratio<D>(sum_of_squared_edges<D>(e), det);
+            sum.add(b, star.weights(b) * powered_ratio<D>(sum_of_squared_edges<D>(e), det));
         }
         for (int i = 0; i < LANES; ++i)
             if (!(smallest[i] > 0.0)) return INFINITY;
-        return sum_of_lanes(sum);
+        return sum.total();
     }
 
     // With derivatives: f = r^D, log r = log S - 2/D log det.
     MeanRatio(const Star<D>& star, const Vec<D>& x) {
         constexpr double p = D;
-        Pack sum = constant<Pack>(0.0);
-        Vec<D, Pack> slope;
-        std::array<Vec<D, Pack>, D> curvature;
-        for (int i = 0; i < D; ++i) {
-            slope[i] = sum;
-            for (int j = 0; j <= i; ++j) curvature[i][j] = sum;
-        }
+        LaneSum sum;
+        std::array<LaneSum, D> slope;
+        std::array<std::array<LaneSum, D>, D> curvature;
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto e = star.edges(star.blocks[b], x);
             const Pack edges2 = sum_of_squared_edges<D>(e), det = determinant(e);
@@ -76,18 +73,18 @@ struct MeanRatio {
             const Vec<D, Pack> s = (constant<Pack>(-2.0) / edges2) * outward;
             const Vec<D, Pack> n = (constant<Pack>(1.0) / det) * determinant_slope(e);
             const Vec<D, Pack> u = s - constant<Pack>(2.0 / D) * n;
-            sum += f;
+            sum.add(b, f);
             for (int i = 0; i < D; ++i) {
-                slope[i] += pf * u[i];
-                curvature[i][i] += pf * (constant<Pack>(2.0 * D) / edges2);
+                slope[i].add(b, pf * u[i]);
+                curvature[i][i].add(b, pf * (constant<Pack>(2.0 * D) / edges2));
                 for (int j = 0; j <= i; ++j)
-                    curvature[i][j] += pf * (p * u[i] * u[j] - s[i] * s[j] + 2.0 / D * n[i] * n[j]);
+                    curvature[i][j].add(b, pf * (p * u[i] * u[j] - s[i] * s[j] + 2.0 / D * n[i] * n[j]));
             }
         }
-        value = sum_of_lanes(sum);
+        value = sum.total();
         for (int i = 0; i < D; ++i) {
-            gradient[i] = sum_of_lanes(slope[i]);
-            for (int j = 0; j <= i; ++j) hessian[i][j] = sum_of_lanes(curvature[i][j]);
+            gradient[i] = slope[i].total();
+            for (int j = 0; j <= i; ++j) hessian[i][j] = curvature[i][j].total();
         }
     }
 

@@ -1,5 +1,6 @@
 // LANES doubles side by side. The formulas of the kernels are written once, for a scalar T that is double or Pack;
-// the operations are those of IEEE double in each lane, so both give the same bits.
+// the operations are those of IEEE double in each lane, so both give the same bits. So do packs of 2 and of 4: minima do
+// not depend on how lanes are packed, and sums are made by `LaneSum`, whose order does not either.
 #pragma once
 
 #include <cmath>
@@ -7,7 +8,12 @@
 
 namespace meshfix {
 
-constexpr int LANES = 2;
+#if defined(__AVX2__)
+constexpr int LANES = 4;
+#else
+constexpr int LANES = 2;  // what every x86-64 and every 64-bit ARM has
+#endif
+constexpr int MOST_LANES = 4;
 
 #if defined(__GNUC__)
 
@@ -76,11 +82,24 @@ inline Pack square_root(Pack p) {
     return p;
 }
 
-inline double sum_of_lanes(Pack p) {
-    double sum = 0.0;
-    for (int i = 0; i < LANES; ++i) sum += p[i];
-    return sum;
-}
+// A sum over blocks of LANES numbers, in MOST_LANES parts.
+class LaneSum {
+ public:
+    LaneSum() {
+        for (Pack& part : parts_) part = constant<Pack>(0.0);
+    }
+    void add(std::size_t block, Pack p) { parts_[block % PARTS] += p; }
+    double total() const {
+        double sum = 0.0;
+        for (const Pack& part : parts_)
+            for (int i = 0; i < LANES; ++i) sum += part[i];
+        return sum;
+    }
+
+ private:
+    static constexpr std::size_t PARTS = MOST_LANES / LANES;
+    Pack parts_[PARTS];
+};
 
 template <class T>
 inline T smaller(T a, T b) {

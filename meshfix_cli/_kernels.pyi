@@ -7,6 +7,7 @@ Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
 
+DUE: int
 BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
 
 class Connectivity:
@@ -85,7 +86,7 @@ def moved(before: Float64, after: Float64) -> NDArray[np.uint8]:
     """1 for the rows (n,) that differ."""
 
 def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
-    """Return the smallest sign * sine^2 of all simplices; -1 where one is not valid."""
+    """Return the smallest sine^2 of the valid simplices; 1: there are none."""
 
 def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
     """Signed measure and validity, each (m,)."""
@@ -96,7 +97,7 @@ def angles(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, Fl
 def relocate(
     move: int,
     points: Float64,
-    visited: NDArray[np.bool_],
+    states: NDArray[np.uint8],
     mesh: Connectivity,
     blocks: Int32,
     threshold_sine2: float,
@@ -105,7 +106,9 @@ def relocate(
     max_move: float,
     threads: int,
 ) -> tuple[int, int]:
-    """Relocate, in place, the vertices to visit (n,) of some blocks of one colour; the numbers visited and moved.
+    """Relocate, in place, the vertices that are due, of some blocks of one colour; the numbers visited and moved.
+
+    States (n,): 0 for a vertex that is held, DUE, or 1 when it has been visited and neither it nor a neighbour moved.
 
     The threshold is that of the active-set method, or the floor of MEAN_RATIO and MEAN_ANGLE. Smoothing makes no
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
@@ -143,11 +146,11 @@ def mean_angle(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tu
 def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, float, Float64, Float64]:
     """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""
 
-def find_words(data: bytes, offsets: Int64, count: int, one_line: bool) -> Int64:
-    """Spans (k * count, 2) of the first words at or behind each offset (k,).
+def find_words(data: bytes, at: int, count: int) -> Int64:
+    """Spans (count, 2) of the first words at or behind an offset; fewer where the data end."""
 
-    With one_line, -1 for those that the line does not have; else fewer spans where the data end.
-    """
+def line_words(data: bytes, offsets: Int64, count: int) -> Int64:
+    """Spans (k * count, 2) of the first words behind each offset (k,), -1 for those that the line does not have."""
 
 def use_threads(threads: int) -> None:
     """Let the passes over text, from here to the end of this file, take as many threads: 1 at first."""

@@ -381,7 +381,7 @@ def untangle(
     document, output = files.open(held, show.threads, history, cells)
     if cells is not None:
         check_cells(document, cells)
-    reach = math.inf if max_move is None else max_move.length(document.mesh)
+    reach = math.inf if max_move is None else max_move.length(document.mesh, show.threads)
     run = steps(
         document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, max_move=reach,
         only_invalid=only_invalid, threads=show.threads,
@@ -434,7 +434,7 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
     from meshfix_cli.perturb import perturb as tangle
 
     document, output = files.open(held, show.threads)
-    length = dist.length(document.mesh)
+    length = dist.length(document.mesh, show.threads)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
     result, notes = files.write(document, perturbed, output)
     facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}

@@ -80,16 +80,6 @@ class Topology:
         return _read_only(self.of_rows(self.connectivity.component))
 
     @cached_property
-    def mates(self) -> NDArray[np.int32]:
-        """(m, d+1) int32: the corner across the facet opposite each corner, -1 on the boundary.
-
-        A corner is simplex * (d+1) + position.
-        """
-        mesh, corners = self.connectivity, self.dimension + 1
-        across = mesh.rows[mesh.mates // corners] * corners + mesh.mates % corners
-        return _read_only(self.of_rows(np.where(mesh.mates < 0, -1, across)))
-
-    @cached_property
     def used(self) -> NDArray[np.bool_]:
         """(n,) bool: the vertices of simplices; other points are isolated."""
         mask = np.zeros(self.n, dtype=bool)
@@ -220,7 +210,7 @@ class Mesh:
         """Return the same mesh with other positions (n, d) float64; the array becomes read-only."""
         if points.shape != self.points.shape or points.dtype != np.float64:
             raise ValueError(f"points have the shape {points.shape}, and this mesh {self.points.shape}")
-        return replace(self, points=_read_only(points))
+        return replace(self, points=_read_only(np.ascontiguousarray(points)))
 
     def with_fixed(self, fixed: NDArray[np.bool_]) -> Mesh:
         """Return the same mesh with more vertices fixed, `fixed` (n,) bool."""
@@ -240,9 +230,9 @@ class Mesh:
         """Return the rows of the connectivity's simplices that have no free vertex."""
         return self.topology.connectivity.stuck(self.along_curve(self.movable), threads)
 
-    def mean_edge_length(self) -> float:
+    def mean_edge_length(self, threads: int = 1) -> float:
         """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
-        stars, points = self.topology.stars(), self.along_curve(self.points)
+        stars, points = self.topology.stars(threads), self.along_curve(self.points)
         start = np.repeat(np.arange(len(points), dtype=np.int32), np.diff(stars.neighbour_offsets))
         once = start < stars.neighbours
         edges = points[stars.neighbours[once]] - points[start[once]]

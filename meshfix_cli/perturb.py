@@ -26,9 +26,9 @@ class Distance:
             raise ValueError(text)
         return cls(value, in_h)
 
-    def length(self, mesh: Mesh) -> float:
+    def length(self, mesh: Mesh, threads: int = 1) -> float:
         """Return the length in model units of a mesh."""
-        return self.value * (mesh.mean_edge_length() if self.in_h else 1.0)
+        return self.value * (mesh.mean_edge_length(threads) if self.in_h else 1.0)
 
 
 def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple[Mesh, int]:

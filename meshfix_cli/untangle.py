@@ -66,7 +66,7 @@ class Phase:
     until : {"valid", "stalled", "settled", "ceiling"}
         When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for `PATIENCE`
         turns through the moves neither were there fewer inverted elements nor was the smallest measure larger;
-        "settled": no vertex moved, which stops every phase; "ceiling": the smallest angle is that of the simplices
+        "settled": no vertex moved, which stops every phase; "ceiling": the smallest sine is that of the simplices
         without a free vertex, or does not rise any more. The last two are phases of smoothing.
     only_invalid : bool
         LP moves visit only stars with an inverted element and those whose neighbours moved in the sweep before.
@@ -257,6 +257,11 @@ def _raised(sine2: float, degrees: float) -> float:
     return math.sin(min(math.asin(math.sqrt(sine2)) + math.radians(degrees), math.pi / 2)) ** 2
 
 
+def _due(vertices: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """States for a sweep that visits these vertices (n,)."""
+    return vertices.astype("u1") * _kernels.DUE
+
+
 class _Run:
     """The positions between two sweeps, and the best so far by what can be mended: simplices that have a free vertex.
 
@@ -274,12 +279,13 @@ class _Run:
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
         self.reach = Reach(self.points, max_move)
         stuck = mesh.stuck(threads)
-        self.stuck = self.stars.simplices[stuck]
-        inverted = _kernels.check(self.points, self.stuck, threads)[0]
+        fixed = self.stars.simplices[stuck]
+        inverted = _kernels.check(self.points, fixed, threads)[0]
+        self.stuck = np.delete(fixed, inverted, axis=0)
         self.mendable = self.stars.simplices
         if len(inverted):
             self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
-        self.beyond_repair = len(inverted), _kernels.check(self.points, self.stuck[inverted], threads)[1]
+        self.beyond_repair = len(inverted), _kernels.check(self.points, fixed[inverted], threads)[1]
         self.changed = np.zeros(len(self.points), dtype=bool)
         self._check()
         self.record = self._record("input", 0, 0)
@@ -366,29 +372,28 @@ class _Run:
         return self.free & self.stars.grown(vertices, rings).view(bool)
 
     def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
-        threshold, visited = self._threshold_sine2(phase), near
+        threshold, states = self._threshold_sine2(phase), _due(near)
         for move in cycle(phase.moves):
+            if len(phase.moves) > 1:  # what was visited by one move is due for the next
+                states = _due(near)
             if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
-                visited = near & (self._broken() | self._grown(self.changed, 1))
-            yield self._relocated(move, visited, threshold)
-            visited = near
-            if len(phase.moves) == 1 and 2 * self.record.moved < len(self.points):
-                visited = near & self._grown(self.changed, 1)  # elsewhere a second visit finds what the first did
+                states = _due(near & (self._broken() | self._grown(self.changed, 1)))
+            yield self._relocated(move, states, threshold)
 
     def _raisings(self, move: Move, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
         ceiling = self._min_sine2(self.stuck)
         smallest, waited = self._min_sine2(self.mendable), 0
         while smallest < ceiling and waited < RAISE_PATIENCE:
-            yield self._relocated(move, near, _raised(smallest, RAISE))
+            yield self._relocated(move, _due(near), _raised(smallest, RAISE))
             now = self._min_sine2(self.mendable)
             waited = 0 if now > _raised(smallest, RISE) else waited + 1
             smallest = max(smallest, now)
 
-    def _relocated(self, move: Move, visited: NDArray[np.bool_], threshold: float) -> NDArray[np.float64]:
+    def _relocated(self, move: Move, states: NDArray[np.uint8], threshold: float) -> NDArray[np.float64]:
         points = self.points.copy()
         for blocks in self.colours:
             _kernels.relocate(
-                move, points, visited, self.stars, blocks, threshold, self.min_measure, self.reach.start,
+                move, points, states, self.stars, blocks, threshold, self.min_measure, self.reach.start,
                 self.reach.distance, self.threads,
             )  # fmt: skip
         return points
@@ -406,8 +411,7 @@ class _Run:
         return max(self.threshold_sine2, floor)
 
     def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
-        """Return the smallest sine^2; 1: there are no simplices, 0: one is not valid."""
-        return max(_kernels.min_sine2(self.points, simplices, self.threads), 0.0)
+        return _kernels.min_sine2(self.points, simplices, self.threads)
 
     def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         from meshfix_cli.foldover import minimisations

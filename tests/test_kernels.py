@@ -133,7 +133,9 @@ def test_facets_boundary_and_stars_by_definition(mesh: Mesh) -> None:
     for s, simplex in enumerate(topology.simplices.tolist()):
         for k in range(d + 1):
             facets[tuple(sorted(simplex[:k] + simplex[k + 1 :]))].append(s * (d + 1) + k)
-    mates = topology.mates.ravel()
+    own = topology.connectivity  # corners of its own, by the rows of the mesh
+    across = np.where(own.mates < 0, -1, own.rows[own.mates // (d + 1)] * (d + 1) + own.mates % (d + 1))
+    mates = topology.of_rows(across).ravel()
     for corners in facets.values():
         if len(corners) == 1:
             assert mates[corners[0]] == -1
@@ -195,9 +197,10 @@ def relocate(
     only: NDArray[np.bool_] | None = None, threshold_sine2: float = 1.0, max_move: float = math.inf, threads: int = 1,
 ) -> None:  # fmt: skip
     stars, local = mesh.topology.stars(), mesh.along_curve(points)
+    states = mesh.along_curve(mesh.movable if only is None else only).astype(np.uint8) * _kernels.DUE
     _kernels.relocate(
-        move, local, mesh.along_curve(mesh.movable if only is None else only), stars, blocks, threshold_sine2,
-        -math.inf, mesh.along_curve(mesh.points), max_move, threads,
+        move, local, states, stars, blocks, threshold_sine2, -math.inf, mesh.along_curve(mesh.points), max_move,
+        threads,
     )  # fmt: skip
     points[stars.vertices] = local
 
@@ -242,12 +245,31 @@ def test_builds_for_wider_vectors_give_the_same_bits(mesh: Mesh, move: Move, cas
         own = kernels.Connectivity(start.points, simplices, used, 1)
         own.build_stars(1)
         points = start.points[own.vertices]
-        reference, visited = points.copy(), movable[own.vertices]
+        reference, states = points.copy(), movable[own.vertices].astype(np.uint8) * kernels.DUE
         for blocks in np.split(own.colour_blocks, own.colour_offsets[1:-1]):
-            kernels.relocate(move, points, visited, own, blocks, 0.07, -math.inf, reference, math.inf, 1)
+            kernels.relocate(move, points, states, own, blocks, 0.07, -math.inf, reference, math.inf, 1)
         summary = own.summarise(points, 12, 0.1, 1)
         results.append((points.tobytes(), *(np.asarray(value).tobytes() for value in summary)))
     assert results[0] == results[1]
+
+
+@pytest.mark.parametrize("move", list(Move))
+def test_vertices_that_are_not_due_would_not_move(fine: Mesh, move: Move) -> None:
+    """A sweep over what is due gives the same bits as one over everything."""
+    start = tangle(fine, 5, 0.3) if move in SMOOTHING_MOVES else tangle(fine, 2, 1)
+    stars, reference = fine.topology.stars(), fine.along_curve(start.points)
+    everything = fine.along_curve(fine.movable).astype(np.uint8) * _kernels.DUE
+    one, two, states, skipped = reference.copy(), reference.copy(), everything.copy(), 0
+    for _ in range(5):
+        for blocks in fine.topology.colours:
+            all_of_them = _kernels.relocate(
+                move, one, everything.copy(), stars, blocks, 0.07, -math.inf, reference, math.inf, 2
+            )
+            some = _kernels.relocate(move, two, states, stars, blocks, 0.07, -math.inf, reference, math.inf, 2)
+            assert all_of_them[1] == some[1]
+            skipped += all_of_them[0] - some[0]
+        assert one.tobytes() == two.tobytes()
+    assert skipped > 0 or move not in (Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH, Move.RAISE_SMALLEST)
 
 
 def collapsed(mesh: Mesh) -> Mesh:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
+
+import generate
 import numpy as np
 import pytest
 from conftest import tangle
@@ -171,6 +176,26 @@ def test_a_mesh_is_a_value(plate: Mesh) -> None:
         plate.points[0, 0] = 1.0
     moved = plate.with_points(plate.points + 1.0)
     assert moved.topology is plate.topology
+
+
+def test_a_mesh_survives_pickling_with_its_order(mesh: Mesh) -> None:
+    """And so the same bits come out in another process."""
+    tangled = tangle(mesh)
+    for copy in (pickle.loads(pickle.dumps(tangled)), deepcopy(tangled)):
+        assert copy.points.tobytes() == tangled.points.tobytes()
+        np.testing.assert_array_equal(copy.topology.simplices, tangled.topology.simplices)
+        assert untangle(copy).after.points.tobytes() == untangle(tangled).after.points.tobytes()
+
+
+def test_one_mesh_may_be_used_by_several_threads() -> None:
+    """Its stars are built by the first that needs them."""
+    for seed in range(5):
+        mesh = Mesh.build(*generate.bracket(0.09, 10))
+        tangled = tangle(Mesh.build(mesh.points, mesh.topology.simplices), 10, 1, seed)
+        fresh = Mesh.build(tangled.points, mesh.topology.simplices)
+        with ThreadPoolExecutor(4) as pool:
+            outcomes = list(pool.map(lambda _: untangle(fresh, threads=2), range(4)))  # noqa: B023
+        assert len({outcome.after.points.tobytes() for outcome in outcomes}) == 1
 
 
 def test_mean_edge_length_is_that_of_the_distinct_edges() -> None:

@@ -121,6 +121,15 @@ def test_the_best_smoothing_goes_to_the_ceiling_or_to_where_nothing_rises(mesh: 
         assert summarise(again).min_angle < smallest + 0.5
 
 
+def test_what_cannot_be_mended_does_not_stop_the_best_smoothing(bracket: Mesh) -> None:
+    stuck = with_an_inverted_fixed_simplex(tangle(bracket))
+    free = bracket.movable[bracket.topology.simplices].any(axis=1)
+    default, best = (untangle(stuck, smooth=smooth).after for smooth in (3, "best"))
+    valid = evaluate("min_sine", best)[free] > 0
+    assert valid.sum() >= (evaluate("min_sine", default)[free] > 0).sum()
+    assert evaluate("min_angle", best)[free].mean() > evaluate("min_angle", default)[free].mean()
+
+
 def test_the_best_smoothing_has_the_same_bits_for_any_number_of_threads(fine: Mesh) -> None:
     tangled = tangle(fine)
     outcomes = [untangle(tangled, smooth="best", threads=threads) for threads in (1, 2, 3)]

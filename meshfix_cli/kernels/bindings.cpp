@@ -60,8 +60,10 @@ auto with_dimension(std::size_t d, const F& f) {
 }
 
 struct PyConnectivity {
-    int dimension;
-    Connectivity mesh;
+    int dimension = 0;
+    Connectivity mesh{};
+    std::mutex building{};  // of the stars, which come later
+    std::atomic<bool> has_stars{false};
 };
 
 template <auto Member>
@@ -108,12 +110,13 @@ Star<D> make_star(const Matrix<const double>& neighbours, const Matrix<const std
 void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
                        const Matrix<const std::int32_t>& simplices, const Vector<const std::int32_t>& used, int threads) {
     if (simplices.shape(1) != points.shape(1) + 1) throw nb::value_error("the simplices are of another dimension");
-    Connectivity mesh = with_dimension(points.shape(1), [&](auto d) {
+    new (self) PyConnectivity();
+    self->dimension = static_cast<int>(points.shape(1));
+    self->mesh = with_dimension(points.shape(1), [&](auto d) {
         return connect<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
                           static_cast<std::int64_t>(simplices.shape(0)),
                           std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
     });
-    new (self) PyConnectivity{static_cast<int>(points.shape(1)), std::move(mesh)};
 }
 
 void flip_py(PyConnectivity& self, const Vector<const bool>& flipped, int threads) {
@@ -122,7 +125,45 @@ void flip_py(PyConnectivity& self, const Vector<const bool>& flipped, int thread
 }
 
 void build_stars_py(PyConnectivity& self, int threads) {
-    with_dimension(self.dimension, [&](auto d) { build_stars<d>(self.mesh, threads); });
+    with_dimension(self.dimension, [&](auto d) {  // the interpreter lock is released first: nobody waits for both
+        const std::lock_guard<std::mutex> lock(self.building);
+        if (self.has_stars) return;
+        build_stars<d>(self.mesh, threads);
+        self.has_stars = true;
+    });
+}
+
+// All but the stars, which are built again.
+nb::tuple state_of(PyConnectivity& self) {
+    return nb::make_tuple(self.dimension, self.mesh.orientable, rows_view<&Connectivity::simplices>(self),
+                          rows_view<&Connectivity::mates>(self), view<&Connectivity::vertices>(self),
+                          view<&Connectivity::rows>(self), view<&Connectivity::offsets>(self),
+                          view<&Connectivity::corners>(self), view<&Connectivity::component>(self),
+                          view<&Connectivity::against>(self));
+}
+
+template <class Array>
+auto copied(const Array& array) {
+    return std::vector<std::remove_const_t<typename Array::Scalar>>(array.data(), array.data() + array.size());
+}
+
+using Int32s = Vector<const std::int32_t>;
+using Int32Rows = Matrix<const std::int32_t>;
+using State = std::tuple<int, bool, Int32Rows, Int32Rows, Int32s, Int32s, Int32s, Int32s, Int32s, Vector<const std::uint8_t>>;
+
+void restore(PyConnectivity& self, const State& state) {
+    new (&self) PyConnectivity();
+    Connectivity& mesh = self.mesh;
+    self.dimension = std::get<0>(state);
+    mesh.orientable = std::get<1>(state);
+    mesh.simplices = copied(std::get<2>(state));
+    mesh.mates = copied(std::get<3>(state));
+    mesh.vertices = copied(std::get<4>(state));
+    mesh.rows = copied(std::get<5>(state));
+    mesh.offsets = copied(std::get<6>(state));
+    mesh.corners = copied(std::get<7>(state));
+    mesh.component = copied(std::get<8>(state));
+    mesh.against = copied(std::get<9>(state));
 }
 
 auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int rings) {
@@ -226,18 +267,18 @@ auto check_simplices_py(const Matrix<const std::int32_t>& simplices, std::int64_
     return std::make_pair(first.outside, first.repeated);
 }
 
-auto relocate_py(int move, const Matrix<double>& points, const Vector<const bool>& visited, const PyConnectivity& self,
+auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
                  const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
                  const Matrix<const double>& start, double max_move, int threads) {
     const Connectivity& mesh = self.mesh;
-    if (mesh.colour_offsets.empty()) throw nb::value_error("the stars are not built");
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
     check_points(points, self);
     check_points(start, self);
-    const std::uint8_t* mask = bytes_of(visited, mesh.n());
+    if (static_cast<std::int64_t>(states.shape(0)) != mesh.n()) throw nb::value_error("the states are of another mesh");
     const Counts counts = with_dimension(points.shape(1), [&](auto d) {
         const StarsView view{mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(),
                              mesh.neighbours.data()};
-        return relocate<d>(static_cast<Move>(move), view, points.data(), mask, mesh.n(), blocks.data(),
+        return relocate<d>(static_cast<Move>(move), view, points.data(), states.data(), mesh.n(), blocks.data(),
                            static_cast<std::int64_t>(blocks.shape(0)),
                            Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
     });
@@ -267,7 +308,7 @@ auto measure_py(const Matrix<const double>& points, const Matrix<const std::int3
                             [&](std::int64_t s, const Edges<D>& e) {
                                 const double det = determinant(e);
                                 measure[s] = det / factorial(D);
-                                valid[s] = is_valid<D>(det, longest_edge2<D>(e));
+                                valid[s] = is_valid<D>(e, det);
                             });
     });
     return std::make_pair(to_numpy(std::move(measure)), to_numpy(std::move(valid)));
@@ -397,16 +438,17 @@ std::string_view word_at(std::string_view text, const std::int64_t* span) {
     return text.substr(static_cast<std::size_t>(span[0]), static_cast<std::size_t>(span[1] - span[0]));
 }
 
-auto find_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t count,
-                   bool one_line) {
+auto find_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    return to_numpy(find_words(view_of(data), at, count, text_threads), 2);
+}
+
+auto line_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t count) {
     const std::string_view text = view_of(data);
-    if (!one_line && offsets.shape(0) == 1) return to_numpy(find_words(text, offsets(0), count, text_threads), 2);
     std::vector<std::int64_t> spans;
     for (std::size_t i = 0; i < offsets.shape(0); ++i) {
         Span word{offsets(i), offsets(i)};
         for (std::int64_t j = 0; j < count; ++j) {
-            if (word.end >= 0) word = next_word(text, word.end, one_line);
-            if (word.end < 0 && !one_line) return to_numpy(std::move(spans), 2);
+            if (word.end >= 0) word = next_word(text, word.end, true);
             spans.insert(spans.end(), {word.begin, word.end});
         }
     }
@@ -526,7 +568,7 @@ MODULE(MESHFIX_MODULE, m) {
     m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
-    m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "visited"_a.noconvert(), "mesh"_a,
+    m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a,
           "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
           "threads"_a);
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
@@ -535,7 +577,8 @@ MODULE(MESHFIX_MODULE, m) {
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("mean_angle", &mean_angle_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
-    m.def("find_words", &find_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a, "one_line"_a);
+    m.def("find_words", &find_words_py, "data"_a, "at"_a, "count"_a);
+    m.def("line_words", &line_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a);
     m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
     m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);
     m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
@@ -552,6 +595,8 @@ MODULE(MESHFIX_MODULE, m) {
     nb::class_<PyConnectivity>(m, "Connectivity")
         .def("__init__", &init_connectivity, "points"_a.noconvert(), "simplices"_a.noconvert(), "used"_a.noconvert(),
              "threads"_a)
+        .def("__getstate__", &state_of)
+        .def("__setstate__", &restore)
         .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
         .def("build_stars", &build_stars_py, "threads"_a)
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
@@ -574,6 +619,7 @@ MODULE(MESHFIX_MODULE, m) {
         .def_prop_ro("colour_offsets", &view<&Connectivity::colour_offsets>)
         .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
     m.attr("BLOCK_SIZE") = BLOCK_SIZE;
+    m.attr("DUE") = DUE;
 
     static_assert(static_cast<int>(Move::mean_angle) == 8, "the codes of untangle.Move");
 }

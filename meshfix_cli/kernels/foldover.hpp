@@ -59,9 +59,8 @@ class Foldover {
             total.energy += part.energy;
             total.min_det = part.min_det < total.min_det ? part.min_det : total.min_det;
         }
-        for_each_item((free + VERTICES_PER_ITEM - 1) / VERTICES_PER_ITEM, threads, [&](std::int64_t item) {
-            const std::int64_t end = std::min(free, (item + 1) * VERTICES_PER_ITEM);
-            for (std::int64_t v = item * VERTICES_PER_ITEM; v < end; ++v) {
+        for_each_range(free, VERTICES_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t v = begin; v < end; ++v) {
                 const Vec<D> g = gradient_at(points, v);
                 for (int k = 0; k < D; ++k) gradient[v * D + k] = g[k];
             }
@@ -81,11 +80,7 @@ class Foldover {
     };
 
     double add(std::int64_t s, const Edges<D>& e, double size, Regularisation r, double& min_det) {
-        double edges2 = 0.0;
-        for (int i = 0; i < D; ++i) {
-            edges2 += norm2(e[i]);
-            for (int j = i + 1; j < D; ++j) edges2 += norm2(e[j] - e[i]);
-        }
+        const double edges2 = sum_of_squared_edges<D>(e);
         const double to_det = 1.0 / (D == 2 ? size * size : size * size * size);
         const double to_trace = 2.0 / ((D + 1) * unit_edge2() * size * size);
         const double det = determinant(e) * to_det;
@@ -111,14 +106,10 @@ class Foldover {
                 p[k] = load<D>(points + static_cast<std::int64_t>(simplices_[s * (D + 1) + face[k]]) * D) - x;
                 edges = edges - p[k];
             }
-            sum = sum + (2.0 * shares_[s].by_edges2) * edges + shares_[s].by_det * determinant_gradient(p);
+            sum = sum + (2.0 * shares_[s].by_edges2) * edges + shares_[s].by_det * determinant_slope(p);
         }
         return sum;
     }
-
-    // Of the determinant of (p - x) by x.
-    static Vec<2> determinant_gradient(const Edges<2>& p) { return {p[0][1] - p[1][1], p[1][0] - p[0][0]}; }
-    static Vec<3> determinant_gradient(const Edges<3>& p) { return cross(p[2] - p[0], p[1] - p[0]); }
 
     std::vector<std::int32_t> simplices_;
     Incidence incidence_;

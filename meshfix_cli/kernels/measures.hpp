@@ -80,13 +80,13 @@ Validity check(const double* points, const std::int32_t* simplices, std::int64_t
     return total;
 }
 
-// The smallest sign(det) * sine^2 of all simplices, -1 where one is not valid.
+// The smallest sine^2 of the valid simplices; 1: there are none.
 template <int D>
 double min_sine2(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
     std::vector<double> parts(m / PER_ITEM + 1, 1.0);
     for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
         const double sine2 = min_sine2(e);
-        if (!(sine2 >= parts[s / PER_ITEM])) parts[s / PER_ITEM] = sine2 > 0.0 ? sine2 : -1.0;
+        if (sine2 > 0.0) parts[s / PER_ITEM] = std::min(parts[s / PER_ITEM], sine2);
     });
     return *std::min_element(parts.begin(), parts.end());
 }

@@ -114,6 +114,48 @@ void for_each_range(std::int64_t count, std::int64_t size, int threads, const Wo
     });
 }
 
+// A byte that several threads may write at once.
+inline std::uint8_t load_relaxed(const std::uint8_t& byte) {
+#if defined(__GNUC__)
+    return __atomic_load_n(&byte, __ATOMIC_RELAXED);
+#else
+    return *static_cast<const volatile std::uint8_t*>(&byte);
+#endif
+}
+inline void store_relaxed(std::uint8_t& byte, std::uint8_t value) {
+#if defined(__GNUC__)
+    __atomic_store_n(&byte, value, __ATOMIC_RELAXED);
+#else
+    *static_cast<volatile std::uint8_t*>(&byte) = value;
+#endif
+}
+
+// Things that each thread needs one of at a time, kept for the next that comes as long as this lives.
+template <class T>
+class Spares {
+ public:
+    // Calls f(thing).
+    template <class F>
+    void with(const F& f) {
+        T thing = take();
+        f(thing);
+        const std::lock_guard<std::mutex> lock(mutex_);
+        kept_.push_back(std::move(thing));
+    }
+
+ private:
+    T take() {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        if (kept_.empty()) return T();
+        T thing = std::move(kept_.back());
+        kept_.pop_back();
+        return thing;
+    }
+
+    std::mutex mutex_;
+    std::vector<T> kept_;
+};
+
 // How many threads the passes over the text of files may take.
 inline std::atomic<int> text_threads{1};
 

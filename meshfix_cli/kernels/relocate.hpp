@@ -24,6 +24,10 @@ struct Parameters {
     double max_move;         // how far from there they may be; infinity: anywhere
 };
 
+// What a sweep knows of each vertex. One is due until it has been visited, and again when it or a neighbour moves:
+// elsewhere a visit would find what the last one did.
+constexpr std::uint8_t HELD = 0, DONE = 1, DUE = 2;
+
 struct Counts {
     std::int64_t visited = 0, moved = 0;
 };
@@ -31,7 +35,8 @@ struct Counts {
 template <int D>
 struct Relocation {
     StarsView stars;
-    double* points;  // (n, D), moved in place
+    double* points;        // (n, D), moved in place
+    std::uint8_t* states;  // (n) HELD, DONE or DUE
     Parameters parameters;
 
     Star<D> star{};
@@ -46,7 +51,17 @@ struct Relocation {
             changed |= points[v * D + k] != x[k];
             points[v * D + k] = x[k];
         }
+        if (changed) make_due(v);
         return changed;
+    }
+
+    // Blocks of one colour may have neighbours in common, but read none of their states.
+    void make_due(std::int64_t v) const {
+        if (states[v] != HELD) states[v] = DUE;
+        for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
+            std::uint8_t& state = states[stars.neighbours[i]];
+            if (load_relaxed(state) == DONE) store_relaxed(state, DUE);
+        }
     }
 
     // The last point in reach on the way to x. The smallest measure is concave (theorem 2.1) and the level sets of
@@ -150,6 +165,7 @@ struct Relocation {
 
     void relocate(Move move, std::int64_t v, Counts& counts) {
         ++counts.visited;
+        states[v] = DONE;
         if (move == Move::laplacian) {
             counts.moved += store(v, centroid<D>(stars, points, v));
             return;
@@ -169,19 +185,20 @@ struct Relocation {
     }
 };
 
-// visited (n): 1 for the vertices to relocate; blocks (count): numbers of the blocks to visit, of one colour.
+// blocks (count): numbers of the blocks to visit, of one colour.
 template <int D>
-Counts relocate(Move move, const StarsView& stars, double* points, const std::uint8_t* visited, std::int64_t n,
+Counts relocate(Move move, const StarsView& stars, double* points, std::uint8_t* states, std::int64_t n,
                 const std::int32_t* blocks, std::int64_t count, const Parameters& parameters, int threads) {
     std::vector<Counts> counts(count);
     for_each_item(count, threads, [&](std::int64_t item) {
         thread_local Relocation<D> work;
         work.stars = stars;
         work.points = points;
+        work.states = states;
         work.parameters = parameters;
         const std::int64_t begin = blocks[item] * BLOCK_SIZE;
         for (std::int64_t v = begin; v < std::min(n, begin + BLOCK_SIZE); ++v)
-            if (visited[v]) work.relocate(move, v, counts[item]);
+            if (states[v] == DUE) work.relocate(move, v, counts[item]);
     });
     Counts total;
     for (const auto& c : counts) {

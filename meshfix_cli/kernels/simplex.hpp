@@ -34,6 +34,26 @@ inline T longest_edge2(const Edges<D, T>& e) {
     return longest;
 }
 
+template <int D, class T>
+inline T sum_of_squared_edges(const Edges<D, T>& e) {
+    T sum = constant<T>(0.0);
+    for (int i = 0; i < D; ++i) {
+        sum += norm2(e[i]);
+        for (int j = i + 1; j < D; ++j) sum += norm2(e[j] - e[i]);
+    }
+    return sum;
+}
+
+// The gradient of the determinant by the vertex that the edges leave.
+template <class T>
+inline Vec<2, T> determinant_slope(const Edges<2, T>& e) {
+    return {e[0][1] - e[1][1], e[1][0] - e[0][0]};
+}
+template <class T>
+inline Vec<3, T> determinant_slope(const Edges<3, T>& e) {
+    return cross(e[2] - e[0], e[1] - e[0]);
+}
+
 // The one validity predicate, for a star in its local frame and for the whole mesh. False for NaN.
 template <int D, class T>
 inline auto is_valid(T det, T longest2) {

@@ -76,37 +76,45 @@ void flip(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
     });
 }
 
+// The neighbours and faces of the vertices of a block; `place` (n) is where a vertex may be in `neighbours`: it is there
+// if it is found there.
+template <int D>
+void find_neighbours(Connectivity& mesh, std::int64_t begin, std::int64_t end, std::vector<std::uint32_t>& place,
+                     std::vector<std::int32_t>& neighbours) {
+    for (std::int64_t v = begin; v < end; ++v) {
+        const std::size_t row = neighbours.size();
+        for (std::int32_t i = mesh.offsets[v]; i < mesh.offsets[v + 1]; ++i) {
+            const std::int32_t here = mesh.corners[i] % (D + 1);
+            const std::int32_t* simplex = &mesh.simplices[mesh.corners[i] - here];
+            const auto& face = opposite_face<D>(here);
+            for (int k = 0; k < D; ++k) {
+                const std::int32_t u = simplex[face[k]];
+                std::size_t at = place[u];
+                if (at < row || at >= neighbours.size() || neighbours[at] != u) {
+                    at = neighbours.size();
+                    place[u] = static_cast<std::uint32_t>(at);
+                    neighbours.push_back(u);
+                }
+                mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(at - row);
+            }
+        }
+        if (neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
+            throw std::length_error("a vertex has more than 65,535 neighbours");
+        mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(neighbours.size() - row);
+    }
+}
+
 template <int D>
 void build_neighbours(Connectivity& mesh, int threads) {
     mesh.faces.resize(mesh.corners.size() * D);
     mesh.neighbour_offsets.assign(mesh.n() + 1, 0);
     std::vector<std::vector<std::int32_t>> found(mesh.blocks());
+    Spares<std::vector<std::uint32_t>> places;
     for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
-        thread_local std::vector<std::uint32_t> place;  // where a vertex may be in `neighbours`: it is if it is found there
-        place.resize(std::max<std::size_t>(place.size(), mesh.n()));
-        auto& neighbours = found[block];
-        neighbours.reserve(20 * (end - begin));
-        for (std::int64_t v = begin; v < end; ++v) {
-            const std::size_t row = neighbours.size();
-            for (std::int32_t i = mesh.offsets[v]; i < mesh.offsets[v + 1]; ++i) {
-                const std::int32_t here = mesh.corners[i] % (D + 1);
-                const std::int32_t* simplex = &mesh.simplices[mesh.corners[i] - here];
-                const auto& face = opposite_face<D>(here);
-                for (int k = 0; k < D; ++k) {
-                    const std::int32_t u = simplex[face[k]];
-                    std::size_t at = place[u];
-                    if (at < row || at >= neighbours.size() || neighbours[at] != u) {
-                        at = neighbours.size();
-                        place[u] = static_cast<std::uint32_t>(at);
-                        neighbours.push_back(u);
-                    }
-                    mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(at - row);
-                }
-            }
-            if (neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
-                throw std::length_error("a vertex has more than 65,535 neighbours");
-            mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(neighbours.size() - row);
-        }
+        places.with([&](std::vector<std::uint32_t>& place) {
+            place.resize(mesh.n());
+            find_neighbours<D>(mesh, begin, end, place, found[block]);
+        });
     });
     std::int64_t total = 0;
     for (std::int64_t v = 0; v < mesh.n(); ++v) {
@@ -149,10 +157,8 @@ inline void colour_blocks(Connectivity& mesh, int threads) {
     }
 }
 
-// Where that is not done yet.
 template <int D>
 void build_stars(Connectivity& mesh, int threads) {
-    if (!mesh.colour_offsets.empty()) return;
     build_neighbours<D>(mesh, threads);
     colour_blocks(mesh, threads);
 }

@@ -42,6 +42,13 @@ struct Pieces {
 
     std::int64_t pieces() const { return static_cast<std::int64_t>(begin.size()) - 1; }
     std::int64_t words() const { return first.back(); }
+    // Where to look for the first word of a piece: behind one that began in the piece before.
+    std::int64_t first_word(std::string_view text, std::int64_t piece) const {
+        std::int64_t at = begin[piece];
+        if (piece > 0 && !separates(text[at - 1]))
+            while (at < begin[piece + 1] && !separates(text[at])) ++at;
+        return at;
+    }
 };
 
 // How many words begin in a part of the text; `at` is where all of them begin.
@@ -53,8 +60,10 @@ inline std::int64_t count_words(std::string_view text, std::int64_t at, std::int
 
 // As many pieces as it takes to have `count` words, or all there are.
 inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
-    const std::int64_t piece = std::clamp<std::int64_t>(8 * count, 64, 1 << 18);
+    constexpr std::int64_t LARGE = 1 << 18;
     const auto size = static_cast<std::int64_t>(text.size());
+    const std::int64_t piece = std::clamp<std::int64_t>(8 * std::clamp<std::int64_t>(count, 0, size), 64, LARGE);
+    if (piece < LARGE) threads = 1;  // it is not worth the while
     Pieces pieces{{at}, {0}};
     while (pieces.words() < count && pieces.begin.back() < size) {
         const std::int64_t begin = pieces.begin.back(), left = (size - begin + piece - 1) / piece;
@@ -75,17 +84,14 @@ inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, in
 template <class F>
 void for_each_piece(std::string_view text, const Pieces& pieces, std::int64_t count, int threads, const F& f) {
     for_each_item(pieces.pieces(), threads, [&](std::int64_t p) {
-        std::int64_t at = pieces.begin[p];
-        if (p > 0 && !separates(text[at - 1]))  // in a word that began in the piece before
-            while (at < pieces.begin[p + 1] && !separates(text[at])) ++at;
-        f(p, at, pieces.first[p], std::min(count, pieces.first[p + 1]));
+        f(p, pieces.first_word(text, p), pieces.first[p], std::min(count, pieces.first[p + 1]));
     });
 }
 
 // The spans of the words from an offset on, as many as there are, at most `count`.
 inline std::vector<std::int64_t> find_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
     const Pieces pieces = cut(text, at, count, threads);
-    std::vector<std::int64_t> spans(2 * std::min(count, pieces.words()));
+    std::vector<std::int64_t> spans(2 * std::clamp<std::int64_t>(count, 0, pieces.words()));
     for_each_piece(text, pieces, count, threads, [&](std::int64_t, std::int64_t at, std::int64_t first, std::int64_t last) {
         for (std::int64_t i = first; i < last; ++i) {
             const Span word = next_word(text, at, false);
@@ -100,10 +106,10 @@ inline std::vector<std::int64_t> find_words(std::string_view text, std::int64_t 
 inline std::int64_t behind_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
     const Pieces pieces = cut(text, at, count, threads);
     if (pieces.words() < count) return -1;
-    for_each_piece(text, pieces, count, 1, [&](std::int64_t p, std::int64_t begin, std::int64_t first, std::int64_t last) {
-        if (p == pieces.pieces() - 1)
-            for (at = begin; first < last; ++first) at = next_word(text, at, false).end;
-    });
+    if (count <= 0) return at;
+    const std::int64_t last = pieces.pieces() - 1;
+    at = pieces.first_word(text, last);
+    for (std::int64_t i = pieces.first[last]; i < count; ++i) at = next_word(text, at, false).end;
     return at;
 }
 
@@ -156,7 +162,7 @@ Integers<T> read_integers(std::string_view text, std::int64_t at, std::int64_t c
     };
     const Pieces pieces = cut(text, at, count, threads);
     Integers<T> result{{}, at};
-    result.values.resize(std::min(count, pieces.words()));
+    result.values.resize(std::clamp<std::int64_t>(count, 0, pieces.words()));
     std::vector<Part> parts(pieces.pieces());
     for_each_piece(text, pieces, count, threads, [&](std::int64_t p, std::int64_t at, std::int64_t first, std::int64_t last) {
         Part part;

@@ -150,7 +150,7 @@ class _Text:
 
     def __init__(self, data: bytes, at: int) -> None:
         self.data = data
-        self.spans = _kernels.find_words(data, np.array([at]), (len(data) - at) // 2 + 1, False)
+        self.spans = _kernels.find_words(data, at, len(data))
         raw = np.frombuffer(data, dtype=np.uint8)
         breaks = np.flatnonzero((raw == ord("\n")) | (raw == ord("\r")))
         starts = np.searchsorted(self.spans[:, 0], breaks[np.searchsorted(breaks, at) :])

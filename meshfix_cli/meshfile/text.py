@@ -21,7 +21,7 @@ def words(data: bytes, at: int, count: int) -> Spans:
     ReadError
         The file ends before.
     """
-    spans = _kernels.find_words(data, np.array([at], dtype=np.int64), min(count, len(data) + 1), False)
+    spans = _kernels.find_words(data, at, count)
     if len(spans) < count:
         raise in_line(data, at, f"{count:,} numbers are announced, and the file is truncated")
     return spans
@@ -30,7 +30,7 @@ def words(data: bytes, at: int, count: int) -> Spans:
 def line_words(data: bytes, offsets: ArrayLike, count: int) -> Spans:
     """Return the spans (k, count, 2) of the first words from each offset (k,) to the end of its line; -1: none."""
     at = np.ascontiguousarray(offsets, dtype=np.int64)
-    return _kernels.find_words(data, at, count, True).reshape(len(at), count, 2)
+    return _kernels.line_words(data, at, count).reshape(len(at), count, 2)
 
 
 def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:

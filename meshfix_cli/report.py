@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -35,8 +35,8 @@ class Report:
     name, command : str
     mesh : Mesh
         The result, as the file stores it.
-    points : (n, 2) or (n, 3) float
-        The result in the coordinates of the file.
+    points : callable
+        Gives the result (n, 2) or (n, 3) float in the coordinates of the file.
     ids : (m,) int64
         The file's numbers of the simplices.
     stages : dict
@@ -60,7 +60,7 @@ class Report:
     name: str
     command: str
     mesh: Mesh
-    points: NDArray[np.floating[Any]]
+    points: Callable[[], NDArray[np.floating[Any]]]
     ids: NDArray[np.int64]
     stages: dict[str, Summary]
     ceiling: float | None
@@ -304,5 +304,5 @@ def _listed(report: Report) -> list[tuple[int, list[float]]]:
     first = report.result.inverted_elements[: report.listed]
     if not len(first):
         return []
-    centroids = report.points[report.mesh.topology.simplices[first]].mean(axis=1, dtype=np.float64)
+    centroids = report.points()[report.mesh.topology.simplices[first]].mean(axis=1, dtype=np.float64)
     return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]

@@ -82,11 +82,11 @@ class Document:
             raise InvalidMeshError("the coordinates are too large for the numbers of the file")
         return mesh.with_points(np.ascontiguousarray(points if self.basis is None else _flat(points, self.basis)))
 
-    def first_valid_as_stored(self, *meshes: Mesh) -> Mesh:
+    def first_valid_as_stored(self, *meshes: Mesh, threads: int = 1) -> Mesh:
         """Return the first of some moved meshes that is valid as the file stores it, else the best."""
         ranked = []
         for mesh in meshes:
-            inverted, smallest = self.as_stored(mesh).check()
+            inverted, smallest = self.as_stored(mesh).check(threads)
             if inverted == 0:
                 return mesh
             ranked.append(((inverted, -smallest), mesh))

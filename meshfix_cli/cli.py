@@ -17,7 +17,7 @@ import click
 from meshfix_cli import __version__
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.perturb import Distance
-from meshfix_cli.untangle import SMOOTH, STRATEGIES, THRESHOLD
+from meshfix_cli.untangle import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh import Mesh
@@ -67,7 +67,12 @@ class _Passes(click.IntRange):
     name = "PASSES|best"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        return value if value == "best" else super().convert(value, param, ctx)
+        if value == "best":
+            return value
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is neither a number of passes from 0 to {self.max:,} nor 'best'", param, ctx)
 
 
 class _Requirement(click.ParamType):  # type: ignore[type-arg]
@@ -332,7 +337,7 @@ def main() -> None:
 )
 @click.option(
     "--smooth",
-    type=_Passes(0),
+    type=_Passes(0, MOST_PASSES),
     metavar="PASSES|best",
     default=SMOOTH,
     show_default=True,
@@ -391,7 +396,8 @@ def untangle(
     outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)), show.threads)
     after = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before, threads=show.threads)
     result, notes = files.write(document, after, output)
-    notes = (*_what_happened(document, outcome, after, result), *notes)
+    asked = ("no angle is below what --threshold asks for",) if smooth and not only_invalid else ()
+    notes = (*_what_happened(document, outcome, after, asked), *notes)
     if history is not None:
         write_text(history, history_csv(outcome.records))
     if cells is not None:
@@ -407,10 +413,12 @@ def untangle(
     sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 
-def _what_happened(document: Document, outcome: Outcome, after: Mesh, result: Mesh) -> tuple[str, ...]:
+def _what_happened(document: Document, outcome: Outcome, after: Mesh, asked: tuple[str, ...]) -> tuple[str, ...]:
     """Say that nothing was to be done, or that the file's numbers are too coarse for the result."""
-    if len(outcome.records) == 1 and outcome.valid:
-        return ("no element is inverted and no angle is below what --threshold asks for: nothing was moved",)
+    if outcome.after is outcome.before and outcome.valid:
+        if len(outcome.records) > 1:
+            return ("no element is inverted and no angle could be made better: nothing was moved",)
+        return (f"{' and '.join(('no element is inverted', *asked))}: nothing was moved",)
     inverted = document.as_stored(outcome.after).check()[0] if outcome.records[-1].inverted == 0 else 0
     if not inverted:
         return ()

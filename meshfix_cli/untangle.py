@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 
 SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
 SMOOTH = 3  # section 4: three passes of smoothing
+MOST_PASSES = 1_000_000
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
 RATIO_SWEEPS = 2  # of "best": later ones gain little
 ANGLE_SWEEPS = 3
+GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone
 FLOOR = 1  # percentile of the smallest angles: the sweeps for the mean angle let no element fall below it
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
 RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
@@ -169,7 +171,15 @@ class Outcome:
 
 
 def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH) -> tuple[Phase, ...]:
-    """Return the phases of a strategy and those of smoothing: so many passes, or the best that can be had."""
+    """Return the phases of a strategy and those of smoothing: so many passes, or the best that can be had.
+
+    Raises
+    ------
+    KeyError, ValueError
+        There is no such strategy, or no such smoothing.
+    """
+    if smooth != "best" and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
+        raise ValueError(f'smooth is {smooth!r}, and must be a number of passes or "best"')
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), SMOOTH, until="settled", from_best=True)
     if smooth == "best":
         return (*STRATEGIES[strategy], passes, *_BEST)
@@ -192,7 +202,8 @@ def steps(
     phase goes up to the ceiling.
 
     A phase that starts from the best mesh where that is not the last one begins with a record of phase "best";
-    smoothing does. The last mesh is never worse than the first, by (inverted elements, smallest measure).
+    smoothing does. The last mesh is never worse than the first, by (inverted elements, smallest measure); where phases
+    that go up to the ceiling gain nothing, it is the first.
 
     Parameters
     ----------
@@ -211,6 +222,8 @@ def steps(
     Source: section 4; the combined smoothing is that of section 3.3.
     """
     degrees = THRESHOLD[mesh.dimension] if threshold is None else threshold
+    if not (0 <= degrees <= 90 and max_move >= 0):
+        raise ValueError("the threshold must be from 0 to 90 degrees, and max_move not negative")
     run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, threads)
     yield run.mesh, run.record
     phases = tuple(phases)
@@ -239,7 +252,8 @@ def steps(
             if phase.until == "stalled" and waited == PATIENCE * len(phase.moves):
                 break
             run.clock = time.perf_counter()
-    if run.record.rank > run.first[1].rank and run.go_back(untangling=False):
+    lost = run.record.rank > run.first[1].rank or (to_the_ceiling and run.first[1].inverted == 0 and not run.gained())
+    if lost and run.go_back(untangling=False):
         yield run.mesh, run.record
 
 
@@ -334,6 +348,14 @@ class _Run:
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
+
+    def gained(self) -> bool:
+        """Whether the mean or the smallest of the smallest angles is larger than in the input, by more than `GAIN`."""
+        before, after = (
+            _kernels.angles(points, self.mendable, self.threads)[0] for points in (self.first[0], self.points)
+        )
+        gains = after.mean() - before.mean(), after.min() - before.min()
+        return bool(max(gains) > math.radians(GAIN))
 
     def go_back(self, untangling: bool) -> bool:
         """Return to the best positions; False: they are the last.
@@ -473,8 +495,8 @@ def untangle(
 
     Raises
     ------
-    KeyError
-        There is no such strategy.
+    KeyError, ValueError
+        There is no such strategy, or an argument is out of range.
 
     Notes
     -----

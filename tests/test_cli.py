@@ -388,6 +388,15 @@ def test_closed_streams(streams: str, tmp_path: Path) -> None:
     assert piped.stdout == (tmp_path / "out.vtk").read_bytes()
 
 
+def test_what_is_said_of_a_valid_mesh_is_true(tmp_path: Path) -> None:
+    """Only where angles were looked at are they spoken of."""
+    sample = SAMPLES / "bracket.vtk"  # valid, with angles below the threshold
+    for options in (["--smooth", 0], ["--only-invalid"], ["--only-invalid", "--smooth", "best"]):
+        text = run("untangle", *options, "--threshold", 30, sample, tmp_path / "o.vtk").stdout.decode()
+        assert "note: no element is inverted: nothing was moved" in text
+        assert (tmp_path / "o.vtk").read_bytes() == sample.read_bytes()
+
+
 def test_the_best_smoothing_is_named_in_the_report(tmp_path: Path) -> None:
     facts = [
         json.loads(run("untangle", "--json", "--smooth", smooth, TANGLED, tmp_path / "o.vtk").stdout)
@@ -502,6 +511,7 @@ def test_empty_and_unknown_stdin() -> None:
         ["untangle", "--strategy", "XX", TANGLED, "o.vtk"],
         ["untangle", "--sweeps", "-1", TANGLED, "o.vtk"],
         ["untangle", "--smooth", "x", TANGLED, "o.vtk"],
+        ["untangle", "--smooth", "9" * 20, TANGLED, "o.vtk"],
         ["untangle", "--threshold", "91", TANGLED, "o.vtk"],
         ["untangle", "--threads", "0", TANGLED, "o.vtk"],
         ["untangle", "--threads", "3000000000", TANGLED, "o.vtk"],

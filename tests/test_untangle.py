@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from typing import Literal
+from typing import Any, Literal
 
 import generate
 import numpy as np
@@ -119,6 +119,25 @@ def test_the_best_smoothing_goes_to_the_ceiling_or_to_where_nothing_rises(mesh: 
     if smallest < top * (1 - 1e-9):  # further sweeps do not help
         again = untangle(best, smooth="best").after
         assert summarise(again).min_angle < smallest + 0.5
+
+
+def test_the_best_smoothing_comes_to_rest(mesh: Mesh) -> None:
+    """A run that gains nothing gives back what it got."""
+    current, runs = untangle(tangle(mesh), smooth="best").after, 0
+    while (after := untangle(current, smooth="best").after) is not current and runs < 10:
+        assert summarise(after).mean_min_angle > summarise(current).mean_min_angle or (
+            summarise(after).min_angle > summarise(current).min_angle
+        )
+        current, runs = after, runs + 1
+    assert runs < 6
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"smooth": "bset"}, {"smooth": -1}, {"smooth": 2.5}, {"threshold": 100}, {"max_move": -1}]
+)
+def test_arguments_out_of_range_are_refused(plate: Mesh, wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="must be"):
+        untangle(plate, **wrong)
 
 
 def test_what_cannot_be_mended_does_not_stop_the_best_smoothing(bracket: Mesh) -> None:

@@ -44,14 +44,19 @@ struct Relocation {
     ActiveSet<D> active_set{};
     MeanAngle<D> mean_angle{};
 
-    bool store(std::int64_t v, Vec<D> x) {
+    bool store(std::int64_t v, const Vec<D>& x) {
+        const bool changed = place(v, x);
+        if (changed) make_due(v);
+        return changed;
+    }
+
+    bool place(std::int64_t v, Vec<D> x) {
         if (parameters.max_move < INFINITY) x = within_reach(v, x);
         bool changed = false;
         for (int k = 0; k < D; ++k) {
             changed |= points[v * D + k] != x[k];
             points[v * D + k] = x[k];
         }
-        if (changed) make_due(v);
         return changed;
     }
 
@@ -165,11 +170,11 @@ struct Relocation {
 
     void relocate(Move move, std::int64_t v, Counts& counts) {
         ++counts.visited;
-        states[v] = DONE;
-        if (move == Move::laplacian) {
-            counts.moved += store(v, centroid<D>(stars, points, v));
+        if (move == Move::laplacian) {  // nearly all move: all stay due
+            counts.moved += place(v, centroid<D>(stars, points, v));
             return;
         }
+        states[v] = DONE;
         star.gather(stars, points, v);
         switch (move) {
             case Move::untangle: counts.moved += untangle(v); break;

@@ -299,17 +299,19 @@ double min_sine2_py(const Matrix<const double>& points, const Matrix<const std::
 }
 
 auto measure_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
-    const std::size_t m = simplices.shape(0);
+    const auto m = static_cast<std::int64_t>(simplices.shape(0));
     std::vector<double> measure(m);
     std::vector<std::uint8_t> valid(m);
     with_dimension(points.shape(1), [&](auto dimension) {
         constexpr int D = dimension;
-        for_each_simplex<D>(points.data(), simplices.data(), static_cast<std::int64_t>(m), threads,
-                            [&](std::int64_t s, const Edges<D>& e) {
-                                const double det = determinant(e);
-                                measure[s] = det / factorial(D);
-                                valid[s] = is_valid<D>(e, det);
-                            });
+        for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t s = begin; s < end; ++s) {
+                const Edges<D> e = edges_of<D>(points.data(), simplices.data() + s * (D + 1));
+                const double det = determinant(e);
+                measure[s] = det / factorial(D);
+                valid[s] = is_valid<D>(e, det);
+            }
+        });
     });
     return std::make_pair(to_numpy(std::move(measure)), to_numpy(std::move(valid)));
 }

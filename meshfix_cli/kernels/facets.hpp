@@ -26,17 +26,22 @@ Incidence incidence(const std::int32_t* simplices, std::int64_t m, std::int64_t 
     constexpr std::int64_t BIN = 4096;
     const std::int64_t corners = m * (D + 1), bins = n / BIN + 1, parts = 64;
     const std::int64_t size = std::max(PER_ITEM, corners / parts + 1);
-    std::vector<std::int64_t> next(bins * parts + 1, 0);  // where in `binned` a part's next corner of a bin goes
+    std::vector<std::int64_t> next(parts * bins, 0);  // where in `binned` a part's next corner of a bin goes
     for_each_range(corners, size, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t part) {
-        for (std::int64_t c = begin; c < end; ++c) ++next[simplices[c] / BIN * parts + part + 1];
+        std::vector<std::int64_t> counts(bins, 0);  // of its own: threads that write side by side wait for one another
+        for (std::int64_t c = begin; c < end; ++c) ++counts[simplices[c] / BIN];
+        std::copy(counts.begin(), counts.end(), next.begin() + part * bins);
     });
-    for (std::size_t i = 1; i < next.size(); ++i) next[i] += next[i - 1];
-    std::vector<std::int64_t> starts(bins + 1);
-    for (std::int64_t b = 0; b <= bins; ++b) starts[b] = next[b * parts];
+    std::vector<std::int64_t> starts(bins + 1, 0);
+    for (std::int64_t b = 0; b < bins; ++b) {
+        std::int64_t at = starts[b];
+        for (std::int64_t part = 0; part < parts; ++part) at += std::exchange(next[part * bins + b], at);
+        starts[b + 1] = at;
+    }
     std::vector<std::int32_t> binned(corners);
     for_each_range(corners, size, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t part) {
-        for (std::int64_t c = begin; c < end; ++c)
-            binned[next[simplices[c] / BIN * parts + part]++] = static_cast<std::int32_t>(c);
+        std::vector<std::int64_t> to(next.begin() + part * bins, next.begin() + (part + 1) * bins);
+        for (std::int64_t c = begin; c < end; ++c) binned[to[simplices[c] / BIN]++] = static_cast<std::int32_t>(c);
     });
     Incidence csr;
     csr.offsets.resize(n + 1);
@@ -137,11 +142,13 @@ std::vector<std::int32_t> stuck_simplices(const std::int32_t* simplices, std::in
                                           int threads) {
     std::vector<std::vector<std::int32_t>> parts(m / PER_ITEM + 1);
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        std::vector<std::int32_t> part;
         for (std::int64_t s = begin; s < end; ++s) {
             int free = 0;
             for (int k = 0; k <= D; ++k) free += movable[simplices[s * (D + 1) + k]];
-            if (free == 0) parts[item].push_back(static_cast<std::int32_t>(s));
+            if (free == 0) part.push_back(static_cast<std::int32_t>(s));
         }
+        parts[item] = std::move(part);
     });
     std::vector<std::int32_t> found;
     for (const auto& part : parts) found.insert(found.end(), part.begin(), part.end());
@@ -158,6 +165,7 @@ FixedFacets fixed_facets(const std::int32_t* simplices, const std::int32_t* mate
                          const std::uint8_t* movable, int threads) {
     std::vector<FixedFacets> parts(m / PER_ITEM + 1);
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        FixedFacets part;
         for (auto s = static_cast<std::int32_t>(begin); s < end; ++s) {
             const std::int32_t* simplex = simplices + static_cast<std::int64_t>(s) * (D + 1);
             int free = 0;
@@ -165,10 +173,11 @@ FixedFacets fixed_facets(const std::int32_t* simplices, const std::int32_t* mate
             for (int k = 0; k <= D; ++k) {
                 const std::int64_t corner = static_cast<std::int64_t>(s) * (D + 1) + k;
                 if (free != (movable[simplex[k]] != 0) || (mates[corner] >= 0 && mates[corner] < corner)) continue;
-                for (int position : opposite_face<D>(k)) parts[item].vertices.push_back(simplex[position]);
-                parts[item].owners.push_back(s);
+                for (int position : opposite_face<D>(k)) part.vertices.push_back(simplex[position]);
+                part.owners.push_back(s);
             }
         }
+        parts[item] = std::move(part);
     });
     FixedFacets found;
     for (const auto& part : parts) {

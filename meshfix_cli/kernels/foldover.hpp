@@ -49,13 +49,11 @@ class Foldover {
     EnergyValue evaluate(const double* points, const double* sizes, Regularisation r, std::int64_t free,
                          double* gradient, int threads) {
         const auto m = static_cast<std::int64_t>(shares_.size());
-        std::vector<EnergyValue> parts(m / PER_ITEM + 1);
-        for_each_simplex<D>(points, simplices_.data(), m, threads, [&](std::int64_t s, const Edges<D>& e) {
-            EnergyValue& part = parts[s / PER_ITEM];
+        const auto look = [&](EnergyValue& part, std::int64_t s, const Edges<D>& e) {
             part.energy += add(s, e, sizes[s], r, part.min_det);
-        });
+        };
         EnergyValue total;
-        for (const auto& part : parts) {
+        for (const auto& part : for_each_simplex<EnergyValue, D>(points, simplices_.data(), m, threads, look)) {
             total.energy += part.energy;
             total.min_det = part.min_det < total.min_det ? part.min_det : total.min_det;
         }

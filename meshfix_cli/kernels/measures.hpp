@@ -48,12 +48,18 @@ void for_each_angles(const double* points, const std::int32_t* simplices, std::i
     }
 }
 
-// Calls f(s, edges) for every simplex.
-template <int D, class F>
-void for_each_simplex(const double* points, const std::int32_t* simplices, std::int64_t m, int threads, const F& f) {
-    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-        for (std::int64_t s = begin; s < end; ++s) f(s, edges_of<D>(points, simplices + s * (D + 1)));
+// Calls f(part, s, edges) for every simplex; returns the parts, one for each item. An item has its part to itself until
+// it is done: threads that write side by side in memory wait for one another.
+template <class Part, int D, class F>
+std::vector<Part> for_each_simplex(const double* points, const std::int32_t* simplices, std::int64_t m, int threads,
+                                   const F& f) {
+    std::vector<Part> parts(m / PER_ITEM + 1);
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        Part part;
+        for (std::int64_t s = begin; s < end; ++s) f(part, s, edges_of<D>(points, simplices + s * (D + 1)));
+        parts[item] = std::move(part);
     });
+    return parts;
 }
 
 struct Validity {
@@ -64,15 +70,13 @@ struct Validity {
 // What a sweep needs to know: nothing of it depends on the threads.
 template <int D>
 Validity check(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
-    std::vector<Validity> parts(m / PER_ITEM + 1);
-    for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
-        Validity& part = parts[s / PER_ITEM];
+    const auto look = [](Validity& part, std::int64_t s, const Edges<D>& e) {
         const double det = determinant(e);
         if (!is_valid<D>(e, det)) part.inverted.push_back(static_cast<std::int32_t>(s));
         part.min_measure = std::min(part.min_measure, det);
-    });
+    };
     Validity total;
-    for (const auto& part : parts) {
+    for (const auto& part : for_each_simplex<Validity, D>(points, simplices, m, threads, look)) {
         total.inverted.insert(total.inverted.end(), part.inverted.begin(), part.inverted.end());
         total.min_measure = std::min(total.min_measure, part.min_measure);
     }
@@ -83,12 +87,17 @@ Validity check(const double* points, const std::int32_t* simplices, std::int64_t
 // The smallest sine^2 of the valid simplices; 1: there are none.
 template <int D>
 double min_sine2(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
-    std::vector<double> parts(m / PER_ITEM + 1, 1.0);
-    for_each_simplex<D>(points, simplices, m, threads, [&](std::int64_t s, const Edges<D>& e) {
+    struct Smallest {
+        double sine2 = 1.0;
+    };
+    const auto look = [](Smallest& part, std::int64_t, const Edges<D>& e) {
         const double sine2 = min_sine2(e);
-        if (sine2 > 0.0) parts[s / PER_ITEM] = std::min(parts[s / PER_ITEM], sine2);
-    });
-    return *std::min_element(parts.begin(), parts.end());
+        if (sine2 > 0.0) part.sine2 = std::min(part.sine2, sine2);
+    };
+    double smallest = 1.0;
+    for (const Smallest& part : for_each_simplex<Smallest, D>(points, simplices, m, threads, look))
+        smallest = std::min(smallest, part.sine2);
+    return smallest;
 }
 
 // What a report needs to know. Angles in radians.
@@ -125,8 +134,10 @@ Summary summarise(const double* points, const std::int32_t* simplices, const std
         parts[item] = std::move(part);
     });
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        std::int64_t folded = 0;
         for (std::int64_t c = begin * (D + 1); c < end * (D + 1); ++c)
-            parts[item].folded += mates[c] > c && sign[c / (D + 1)] * sign[mates[c] / (D + 1)] < 0;
+            folded += mates[c] > c && sign[c / (D + 1)] * sign[mates[c] / (D + 1)] < 0;
+        parts[item].folded = folded;
     });
     total.histogram.assign(bins, 0);
     for (const auto& part : parts) {

@@ -201,9 +201,11 @@ Counts relocate(Move move, const StarsView& stars, double* points, std::uint8_t*
         work.points = points;
         work.states = states;
         work.parameters = parameters;
+        Counts mine;  // of its own: threads that write side by side in memory wait for one another
         const std::int64_t begin = blocks[item] * BLOCK_SIZE;
         for (std::int64_t v = begin; v < std::min(n, begin + BLOCK_SIZE); ++v)
-            if (states[v] == DUE) work.relocate(move, v, counts[item]);
+            if (states[v] == DUE) work.relocate(move, v, mine);
+        counts[item] = mine;
     });
     Counts total;
     for (const auto& c : counts) {

@@ -43,7 +43,7 @@ def phases(path: str, target: str, threads: int) -> dict[str, float]:
     outcome = untangle(document.mesh, threads=threads)
     for record in outcome.records:
         seconds["smooth" if record.phase.startswith(SMOOTHING) else "untangle"] += record.seconds
-    after = timed("write", document.first_valid_as_stored, outcome.after)
+    after, _ = timed("write", document.first_valid_as_stored, outcome.after, threads=threads)
     timed("write", write, document, after, target)
     timed("report", find_obstacles, document.mesh, threads)
     for mesh in (outcome.before, outcome.untangled, outcome.after):

@@ -82,7 +82,7 @@ def used_vertices(simplices: Int32, n: int) -> Int32:
 def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
     """Rows of the inverted simplices, and the smallest signed measure."""
 
-def moved(before: Float64, after: Float64) -> NDArray[np.uint8]:
+def moved(before: Float64, after: Float64, threads: int) -> NDArray[np.uint8]:
     """1 for the rows (n,) that differ."""
 
 def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:

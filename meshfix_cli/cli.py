@@ -394,10 +394,11 @@ def untangle(
         only_invalid=only_invalid, threads=show.threads,
     )  # fmt: skip
     outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)), show.threads)
-    after = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before, threads=show.threads)
+    meshes = outcome.after, outcome.untangled, outcome.before
+    after, rounded = document.first_valid_as_stored(*meshes, threads=show.threads)
     result, notes = files.write(document, after, output)
     asked = ("no angle is below what --threshold asks for",) if smooth and not only_invalid else ()
-    notes = (*_what_happened(document, outcome, after, asked), *notes)
+    notes = (*_what_happened(document, outcome, after, rounded, asked), *notes)
     if history is not None:
         write_text(history, history_csv(outcome.records))
     if cells is not None:
@@ -413,19 +414,20 @@ def untangle(
     sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 
-def _what_happened(document: Document, outcome: Outcome, after: Mesh, asked: tuple[str, ...]) -> tuple[str, ...]:
-    """Say that nothing was to be done, or that the file's numbers are too coarse for the result."""
+def _what_happened(
+    document: Document, outcome: Outcome, after: Mesh, rounded: int, asked: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded."""
     if outcome.after is outcome.before and outcome.valid:
         if len(outcome.records) > 1:
             return ("no element is inverted and no angle could be made better: nothing was moved",)
         return (f"{' and '.join(('no element is inverted', *asked))}: nothing was moved",)
-    inverted = document.as_stored(outcome.after).check()[0] if outcome.records[-1].inverted == 0 else 0
-    if not inverted:
+    if outcome.records[-1].inverted or not rounded:
         return ()
     kind = document.source.points.dtype.name
     way_out = "; --double stores them as they are" if kind == "float32" else ""
     written = "" if after is outcome.after else ", so the mesh before that is written"
-    return (f"positions rounded to the file's {kind} invert {inverted:,} elements{written}{way_out}",)
+    return (f"positions rounded to the file's {kind} invert {rounded:,} elements{written}{way_out}",)
 
 
 @main.command()

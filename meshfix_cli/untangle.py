@@ -337,7 +337,7 @@ class _Run:
 
     def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
         """Take the points of a sweep; return whether there was progress."""
-        self.changed = _kernels.moved(self.points, points).view(bool)
+        self.changed = _kernels.moved(self.points, points, self.threads).view(bool)
         if self.only_invalid and not phase.moves:
             self.near = self.near | self.changed
         self.points = points

@@ -93,7 +93,7 @@ def check(path: Path, data: bytes) -> None:
         _, peak = tracemalloc.get_traced_memory()
         assert peak <= MEMORY * len(data) + MARGIN
         outcome = untangle(document.mesh, sweeps=2, smooth=1)
-        after = document.first_valid_as_stored(outcome.after, outcome.before)
+        after, _ = document.first_valid_as_stored(outcome.after, outcome.before)
         result, _ = write(document, after, target)
     except MeshfixError as error:
         assert "\n" not in str(error)

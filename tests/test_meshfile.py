@@ -92,7 +92,7 @@ def test_rounding_never_makes_a_valid_file_worse(tmp_path: Path) -> None:
     meshio.Mesh(points, [("triangle", fan)]).write(path)
     document = read(path)
     outcome = untangle(document.mesh)
-    chosen = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
+    chosen, _ = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
     assert document.as_stored(chosen).check()[0] <= document.mesh.check()[0]
 
 

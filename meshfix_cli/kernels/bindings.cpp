@@ -230,11 +230,14 @@ auto mean_angle_py(const Matrix<const double>& neighbours, const Matrix<const st
 }
 
 // Where two arrays of points differ.
-auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after) {
+auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after, int threads) {
     if (before.size() != after.size()) throw nb::value_error("the points are of two meshes");
     const std::size_t n = before.shape(0), d = before.shape(1);
     std::vector<std::uint8_t> moved(n, 0);
-    for (std::size_t i = 0; i < n * d; ++i) moved[i / d] |= before.data()[i] != after.data()[i];
+    for_each_range(static_cast<std::int64_t>(n), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
+            for (std::size_t k = i * d; k < (i + 1) * d; ++k) moved[i] |= before.data()[k] != after.data()[k];
+    });
     return to_numpy(std::move(moved));
 }
 
@@ -566,7 +569,7 @@ MODULE(MESHFIX_MODULE, m) {
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
-    m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert());
+    m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert(), "threads"_a);
     m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);

@@ -60,7 +60,7 @@ class Document:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
         original = self.source.points
         points: NDArray[np.floating[Any]] = original.copy()
-        moved = _kernels.moved(self.mesh.points, mesh.points).view(bool) & mesh.topology.used
+        moved = _kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & mesh.topology.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
                 points[moved] = mesh.points[moved]
@@ -82,15 +82,18 @@ class Document:
             raise InvalidMeshError("the coordinates are too large for the numbers of the file")
         return mesh.with_points(np.ascontiguousarray(points if self.basis is None else _flat(points, self.basis)))
 
-    def first_valid_as_stored(self, *meshes: Mesh, threads: int = 1) -> Mesh:
-        """Return the first of some moved meshes that is valid as the file stores it, else the best."""
+    def first_valid_as_stored(self, *meshes: Mesh, threads: int = 1) -> tuple[Mesh, int]:
+        """Return the first of some moved meshes that is valid as the file stores it, else the best.
+
+        The second value is the number of elements of the first mesh that are inverted as the file stores it.
+        """
         ranked = []
         for mesh in meshes:
             inverted, smallest = self.as_stored(mesh).check(threads)
-            if inverted == 0:
-                return mesh
             ranked.append(((inverted, -smallest), mesh))
-        return min(ranked, key=lambda pair: pair[0])[1]
+            if inverted == 0:
+                break
+        return min(ranked, key=lambda pair: pair[0])[1], ranked[0][0][0]
 
     def is_file(self, target: str) -> bool:
         """Whether a target is the file that was read, under whatever name."""

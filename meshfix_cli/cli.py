@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-import math
 import os
 import signal
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
 from meshfix_cli import __version__
-from meshfix_cli.errors import MeshfixError, WriteError
+from meshfix_cli.errors import MeshfixError
 from meshfix_cli.perturb import Distance
+from meshfix_cli.repair import Files, Held, Judge, Method, repair
 from meshfix_cli.untangle import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh import Mesh
     from meshfix_cli.meshfile import Document
     from meshfix_cli.meshfile.formats import Format
-    from meshfix_cli.obstacles import Obstacles
     from meshfix_cli.quality import Requirement
     from meshfix_cli.report import Report
-    from meshfix_cli.untangle import Outcome
 
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
 
@@ -147,71 +145,28 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-@dataclass(frozen=True)
-class _Held:
-    """What is held still beside the boundary."""
-
-    fix: str | None
-    regions: str | None
-
-    def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
-        from meshfix_cli.meshfile import read
-
-        if source == "-" and sys.stdin.isatty():
-            raise click.UsageError("there is no INPUT, and stdin is a terminal")
-        return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation, threads=threads)
+def _check_input(source: str) -> None:
+    if source == "-" and sys.stdin.isatty():
+        raise click.UsageError("there is no INPUT, and stdin is a terminal")
 
 
-@dataclass(frozen=True)
-class _Files:
-    """INPUT and OUTPUT."""
+def _open(files: Files, held: Held, show: _Show, *others: str | None) -> tuple[Document, Format]:
+    """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
+    named = [other for other in others if other is not None]
+    for i, other in enumerate(named):
+        _check_other(other, files.source, files.target, *named[:i])
+    _check_input(files.source)
+    document, output = files.open(held, show.threads)
+    if output.binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
+        raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
+    return document, output
 
-    source: str
-    target: str
-    form: str | None
-    double: bool
-    fix_orientation: bool
-    backup: bool
-    dry_run: bool
 
-    def open(self, held: _Held, threads: int, *others: str | None) -> tuple[Document, Format]:
-        """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
-        from meshfix_cli.meshfile import check_target, output_format
+def _report_stream(files: Files) -> Any:
+    """stderr where the mesh goes to stdout, or to a pipe or device that stdout may be."""
+    from meshfix_cli.meshfile import is_stream
 
-        named = [other for other in others if other is not None]
-        for i, other in enumerate(named):
-            _check_other(other, self.source, self.target, *named[:i])
-        if not self.dry_run:
-            check_target(self.target)
-        document = held.read(self.source, threads, double=self.double, fix_orientation=self.fix_orientation)
-        output = output_format(document, self.target, self.form)
-        if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
-            lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
-            raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")
-        if output.binary and self.target == "-" and sys.stdout.isatty() and not self.dry_run:
-            raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
-        return document, output
-
-    def write(self, document: Document, mesh: Mesh, output: Format) -> tuple[Mesh, tuple[str, ...]]:
-        """Write OUTPUT; return the mesh as the file holds it, and what the user should know."""
-        from meshfix_cli.meshfile import write
-
-        if self.dry_run:
-            return document.as_stored(mesh), ()
-        stored, dropped = write(document, mesh, self.target, output, self.backup)
-        if document.is_kept_by(output):
-            return stored, ()
-        if document.source.layout is None:
-            return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
-        lost = f"; dropped: {', '.join(dropped)}" if dropped else ""
-        return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
-
-    @property
-    def report_stream(self) -> Any:
-        """stderr where the mesh goes to stdout, or to a pipe or device that stdout may be."""
-        from meshfix_cli.meshfile import is_stream
-
-        return sys.stderr if is_stream(self.target) and not self.dry_run else sys.stdout
+    return sys.stderr if is_stream(files.target) and not files.dry_run else sys.stdout
 
 
 @dataclass(frozen=True)
@@ -223,37 +178,8 @@ class _Show:
     quiet: bool
     threads: int
 
-    def report(
-        self,
-        command: str,
-        document: Document,
-        stages: Mapping[str, Mesh],
-        notes: tuple[str, ...] = (),
-        requirements: tuple[Requirement, ...] = (),
-        obstacles: Obstacles | None = None,
-        **more: Any,
-    ) -> Report:
-        from meshfix_cli.obstacles import find_obstacles
-        from meshfix_cli.quality import ceiling, summarise
-        from meshfix_cli.report import Report
-
-        result = list(stages.values())[-1]
-        shown = list(stages)[-1:] if self.quiet else list(stages)  # nobody sees the others
-        metrics = tuple(dict.fromkeys((*self.metrics, *(one.name for one in requirements if one.is_metric))))
-        return Report(
-            name=document.name,
-            command=command,
-            mesh=result,
-            points=partial(document.file_points, result),
-            ids=document.ids,
-            stages={stage: summarise(stages[stage], metrics, self.threads) for stage in shown},
-            ceiling=None if self.quiet else ceiling(result, self.threads),
-            obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
-            fixed=document.fixed,
-            notes=(*document.notes, *notes),
-            requirements=requirements,
-            **more,
-        )
+    def judge(self, requirements: tuple[Requirement, ...] = ()) -> Judge:
+        return Judge(self.metrics, requirements, self.threads, brief=self.quiet)
 
     def print(self, report: Report, stream: Any) -> None:
         from meshfix_cli.report import console, print_json, print_report
@@ -280,7 +206,7 @@ def _packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[...
 
 _holding = _packed(
     "held",
-    _Held,
+    Held,
     click.option("--fix", metavar="NAME", help="Hold the vertices where this point-data array is not zero."),
     click.option("--regions", metavar="NAME", help="Hold the interfaces between the regions of this cell-data array."),
 )
@@ -296,7 +222,7 @@ _reporting = _packed(
 )
 _writing = _packed(
     "files",
-    _Files,
+    Files,
     click.argument("source", metavar="[INPUT]", default="-"),
     click.argument("target", metavar="[OUTPUT]", default="-"),
     click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
@@ -304,6 +230,34 @@ _writing = _packed(
     click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
     click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
     click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
+)
+_solving = _packed(
+    "method",
+    Method,
+    click.option("--strategy", type=click.Choice(tuple(STRATEGIES)), default="auto", show_default=True),
+    click.option(
+        "--sweeps",
+        type=click.IntRange(0),
+        help="Untangling sweeps at most, all phases together. [default: as each needs]",
+    ),
+    click.option(
+        "--smooth",
+        type=_Passes(0, MOST_PASSES),
+        metavar="PASSES|best",
+        default=SMOOTH,
+        show_default=True,
+        help="Smoothing passes; best: then the mean, then the smallest angle up to its ceiling. "
+        "For a million tetrahedra three passes take 0.4 s, best 2.5 s of one core.",
+    ),
+    click.option(
+        "--threshold",
+        type=_Range(0, 90),
+        metavar="DEGREES",
+        help="Optimise stars with smaller angles. "
+        f"[default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
+    ),
+    click.option("--max-move", type=_Distance(), help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
+    click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
 )
 _cells = click.option("--cells", metavar="FILE", help="Write a .vtu or .vtk with the quality of each element.")
 _require = click.option(
@@ -329,29 +283,7 @@ def main() -> None:
 
 @main.command()
 @_writing
-@click.option("--strategy", type=click.Choice(tuple(STRATEGIES)), default="auto", show_default=True)
-@click.option(
-    "--sweeps",
-    type=click.IntRange(0),
-    help="Untangling sweeps at most, all phases together. [default: as each needs]",
-)
-@click.option(
-    "--smooth",
-    type=_Passes(0, MOST_PASSES),
-    metavar="PASSES|best",
-    default=SMOOTH,
-    show_default=True,
-    help="Smoothing passes; best: then the mean, then the smallest angle up to its ceiling. "
-    "For a million tetrahedra three passes take 0.4 s, best 2.5 s of one core.",
-)
-@click.option(
-    "--threshold",
-    type=_Range(0, 90),
-    metavar="DEGREES",
-    help=f"Optimise stars with smaller angles. [default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
-)
-@click.option("--max-move", type=_Distance(), help="Move no vertex farther; 0.5h: half a mean edge of INPUT.")
-@click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them.")
+@_solving
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
 @click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
@@ -359,15 +291,10 @@ def main() -> None:
 @_holding
 @_reporting
 def untangle(
-    files: _Files,
-    held: _Held,
+    files: Files,
+    held: Held,
     show: _Show,
-    strategy: str,
-    sweeps: int | None,
-    smooth: int | Literal["best"],
-    threshold: float | None,
-    max_move: Distance | None,
-    only_invalid: bool,
+    method: Method,
     history: str | None,
     cells: str | None,
     allow_inverted: bool,
@@ -381,53 +308,19 @@ def untangle(
     For CONDITION see `meshfix quality --help`.
     """
     from meshfix_cli.meshfile import check_cells, write_text
-    from meshfix_cli.quality import displacement
     from meshfix_cli.report import console, history_csv, with_progress
-    from meshfix_cli.untangle import collect, plan, steps
 
-    document, output = files.open(held, show.threads, history, cells)
+    document, output = _open(files, held, show, history, cells)
     if cells is not None:
         check_cells(document, cells)
-    reach = math.inf if max_move is None else max_move.length(document.mesh, show.threads)
-    run = steps(
-        document.mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, max_move=reach,
-        only_invalid=only_invalid, threads=show.threads,
-    )  # fmt: skip
-    outcome = collect(run if show.quiet or show.as_json else with_progress(run, console(sys.stderr)), show.threads)
-    meshes = outcome.after, outcome.untangled, outcome.before
-    after, rounded = document.first_valid_as_stored(*meshes, threads=show.threads)
-    result, notes = files.write(document, after, output)
-    asked = ("no angle is below what --threshold asks for",) if smooth and not only_invalid else ()
-    notes = (*_what_happened(document, outcome, after, rounded, asked), *notes)
+    watch = iter if show.quiet or show.as_json else partial(with_progress, out=console(sys.stderr))
+    report = repair(document, output, files, method, show.judge(requirements), watch)
     if history is not None:
-        write_text(history, history_csv(outcome.records))
+        write_text(history, history_csv(report.records))
     if cells is not None:
-        _write_cells(document, result, cells, show.threads)
-    stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
-    facts: dict[str, Any] = {"strategy": strategy, "displacement": displacement(outcome.before, result)}
-    if max_move is not None:
-        facts["max_move"] = reach
-    report = show.report(
-        "untangle", document, stages, notes, requirements, outcome.obstacles, records=outcome.records, facts=facts
-    )
-    show.print(report, files.report_stream)
+        _write_cells(document, report.mesh, cells, show.threads)
+    show.print(report, _report_stream(files))
     sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
-
-
-def _what_happened(
-    document: Document, outcome: Outcome, after: Mesh, rounded: int, asked: tuple[str, ...]
-) -> tuple[str, ...]:
-    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded."""
-    if outcome.after is outcome.before and outcome.valid:
-        if len(outcome.records) > 1:
-            return ("no element is inverted and no angle could be made better: nothing was moved",)
-        return (f"{' and '.join(('no element is inverted', *asked))}: nothing was moved",)
-    if outcome.records[-1].inverted or not rounded:
-        return ()
-    kind = document.source.points.dtype.name
-    way_out = "; --double stores them as they are" if kind == "float32" else ""
-    written = "" if after is outcome.after else ", so the mesh before that is written"
-    return (f"positions rounded to the file's {kind} invert {rounded:,} elements{written}{way_out}",)
 
 
 @main.command()
@@ -437,7 +330,7 @@ def _what_happened(
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @_holding
 @_reporting
-def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Distance, seed: int) -> None:
+def perturb(files: Files, held: Held, show: _Show, percent: float, dist: Distance, seed: int) -> None:
     """Tangle a mesh as the paper does: move some interior vertices by a distance in random directions.
 
     With one seed, the same vertices move in the same directions whatever --percent and --dist are. Exits with 0
@@ -445,13 +338,13 @@ def perturb(files: _Files, held: _Held, show: _Show, percent: float, dist: Dista
     """
     from meshfix_cli.perturb import perturb as tangle
 
-    document, output = files.open(held, show.threads)
+    document, output = _open(files, held, show)
     length = dist.length(document.mesh, show.threads)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
     result, notes = files.write(document, perturbed, output)
     facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}
-    report = show.report("perturb", document, {"before": document.mesh, "perturbed": result}, notes, facts=facts)
-    show.print(report, files.report_stream)
+    stages = {"before": document.mesh, "perturbed": result}
+    show.print(show.judge().report("perturb", document, stages, notes, facts=facts), _report_stream(files))
 
 
 @main.command()
@@ -466,7 +359,7 @@ def quality(
     cells: str | None,
     everything: bool,
     requirements: tuple[Requirement, ...],
-    held: _Held,
+    held: Held,
     show: _Show,
 ) -> None:
     """Report the quality of meshes, and where elements are inverted. One unreadable mesh does not stop the others.
@@ -479,12 +372,13 @@ def quality(
     codes = set()
     for source in sources:
         try:
+            _check_input(source)
             document = held.read(source, show.threads)
             if cells is not None:
                 _check_other(cells, source)
                 _write_cells(document, document.mesh, cells, show.threads)
             stages = {"mesh": document.mesh}
-            report = show.report("quality", document, stages, (), requirements, everything=everything)
+            report = show.judge(requirements).report("quality", document, stages, everything=everything)
         except MeshfixError as error:
             _complain(str(error))
             codes.add(ERROR)

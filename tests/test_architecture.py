@@ -25,7 +25,8 @@ ALLOWED = {
     "perturb": {"mesh"},
     "meshfile": {"_kernels", "errors", "mesh"},
     "report": {"mesh", "obstacles", "quality", "untangle"},
-    "cli": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "untangle", "__init__"},
+    "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "untangle"},
+    "cli": {"errors", "mesh", "meshfile", "perturb", "quality", "repair", "report", "untangle", "__init__"},
     "__init__": {"mesh", "meshfile", "perturb", "quality", "untangle"},
     "__main__": {"cli"},
 }

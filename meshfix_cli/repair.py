@@ -1,0 +1,218 @@
+"""One mesh from file to file: what `meshfix untangle` does, for one command and for each file of a batch.
+
+Light to import: the command line reads the fields of the classes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
+
+from meshfix_cli.errors import WriteError
+from meshfix_cli.perturb import Distance
+from meshfix_cli.untangle import SMOOTH, collect, plan, steps
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh import Mesh
+    from meshfix_cli.meshfile import Document
+    from meshfix_cli.meshfile.formats import Format
+    from meshfix_cli.obstacles import Obstacles
+    from meshfix_cli.quality import Requirement
+    from meshfix_cli.report import Report
+    from meshfix_cli.untangle import Outcome, SweepRecord
+
+    Steps = Iterator[tuple[Mesh, SweepRecord]]
+
+
+@dataclass(frozen=True)
+class Held:
+    """What is held still beside the boundary: names of arrays, see `meshfile.read`."""
+
+    fix: str | None = None
+    regions: str | None = None
+
+    def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
+        """Read a mesh; the errors are those of `meshfile.read`."""
+        from meshfix_cli.meshfile import read
+
+        return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation, threads=threads)
+
+
+@dataclass(frozen=True)
+class Files:
+    """The file that is read and the one that is written; the fields are the options of the command line."""
+
+    source: str
+    target: str
+    form: str | None = None
+    double: bool = False
+    fix_orientation: bool = False
+    backup: bool = False
+    dry_run: bool = False
+
+    def open(self, held: Held, threads: int) -> tuple[Document, Format]:
+        """Read the mesh, and find out before any work whether the output can be written.
+
+        Raises
+        ------
+        ReadError, InvalidMeshError, WriteError
+        """
+        from meshfix_cli.meshfile import check_target, output_format
+
+        if not self.dry_run:
+            check_target(self.target)
+        document = held.read(self.source, threads, double=self.double, fix_orientation=self.fix_orientation)
+        output = output_format(document, self.target, self.form)
+        if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
+            lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
+            raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")
+        return document, output
+
+    def write(self, document: Document, mesh: Mesh, output: Format) -> tuple[Mesh, tuple[str, ...]]:
+        """Write a moved mesh; return it as the file holds it, and what the user should know."""
+        from meshfix_cli.meshfile import write
+
+        if self.dry_run:
+            return document.as_stored(mesh), ()
+        stored, dropped = write(document, mesh, self.target, output, self.backup)
+        if document.is_kept_by(output):
+            return stored, ()
+        if document.source.layout is None:
+            return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
+        lost = f"; dropped: {', '.join(dropped)}" if dropped else ""
+        return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
+
+
+@dataclass(frozen=True)
+class Method:
+    """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `untangle.plan`."""
+
+    strategy: str = "auto"
+    sweeps: int | None = None
+    smooth: int | Literal["best"] = SMOOTH
+    threshold: float | None = None
+    max_move: Distance | None = None
+    only_invalid: bool = False
+
+    def reach(self, mesh: Mesh, threads: int) -> float:
+        """Return how far vertices may move, in model units."""
+        return math.inf if self.max_move is None else self.max_move.length(mesh, threads)
+
+    def steps(self, mesh: Mesh, reach: float, threads: int) -> Steps:
+        """Run the phases, see `untangle.steps`."""
+        return steps(
+            mesh, plan(self.strategy, self.smooth), sweeps=self.sweeps, threshold=self.threshold, max_move=reach,
+            only_invalid=self.only_invalid, threads=threads,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Judge:
+    """What is found out about a result.
+
+    Attributes
+    ----------
+    metrics : tuple of str
+        Keys of `quality.METRICS`.
+    requirements : tuple of Requirement
+    threads : int
+    brief : bool
+        Only what tells whether the result is valid and meets the requirements.
+    """
+
+    metrics: tuple[str, ...] = ()
+    requirements: tuple[Requirement, ...] = ()
+    threads: int = 1
+    brief: bool = False
+
+    def report(
+        self,
+        command: str,
+        document: Document,
+        stages: Mapping[str, Mesh],
+        notes: tuple[str, ...] = (),
+        obstacles: Obstacles | None = None,
+        **more: Any,
+    ) -> Report:
+        """Summarise the stages of a mesh, of which the last is the result."""
+        from meshfix_cli.obstacles import find_obstacles
+        from meshfix_cli.quality import ceiling, summarise
+        from meshfix_cli.report import Report
+
+        result = list(stages.values())[-1]
+        shown = list(stages)[-1:] if self.brief else list(stages)  # nobody sees the others
+        asked = (one.name for one in self.requirements if one.is_metric)
+        metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
+        return Report(
+            name=document.name,
+            command=command,
+            mesh=result,
+            points=partial(document.file_points, result),
+            ids=document.ids,
+            stages={stage: summarise(stages[stage], metrics, self.threads) for stage in shown},
+            ceiling=None if self.brief else ceiling(result, self.threads),
+            obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
+            fixed=document.fixed,
+            notes=(*document.notes, *notes),
+            requirements=self.requirements,
+            **more,
+        )
+
+
+def repair(
+    document: Document,
+    output: Format,
+    files: Files,
+    method: Method,
+    judge: Judge,
+    watch: Callable[[Steps], Steps] = iter,
+) -> Report:
+    """Untangle and smooth a mesh, write it and report.
+
+    Parameters
+    ----------
+    document, output
+        What `files.open` gave.
+    files : Files
+    method : Method
+    judge : Judge
+    watch : callable
+        Passes the steps through, to show them.
+
+    Raises
+    ------
+    WriteError, InvalidMeshError
+        Nothing was written.
+    """
+    from meshfix_cli.quality import displacement
+
+    threads = judge.threads
+    reach = method.reach(document.mesh, threads)
+    outcome = collect(watch(method.steps(document.mesh, reach, threads)), threads)
+    meshes = outcome.after, outcome.untangled, outcome.before
+    after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
+    result, written = files.write(document, after, output)
+    notes = (*_what_happened(document, method, outcome, after, rounded), *written)
+    stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
+    facts: dict[str, Any] = {"strategy": method.strategy, "displacement": displacement(outcome.before, result)}
+    if method.max_move is not None:
+        facts["max_move"] = reach
+    return judge.report("untangle", document, stages, notes, outcome.obstacles, records=outcome.records, facts=facts)
+
+
+def _what_happened(document: Document, method: Method, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
+    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded."""
+    if outcome.after is outcome.before and outcome.valid:
+        if len(outcome.records) > 1:
+            return ("no element is inverted and no angle could be made better: nothing was moved",)
+        asked = " and no angle is below what --threshold asks for" * bool(method.smooth and not method.only_invalid)
+        return (f"no element is inverted{asked}: nothing was moved",)
+    if outcome.records[-1].inverted or not rounded:
+        return ()
+    kind = document.source.points.dtype.name
+    way_out = "; --double stores them as they are" if kind == "float32" else ""
+    written = "" if after is outcome.after else ", so the mesh before that is written"
+    return (f"positions rounded to the file's {kind} invert {rounded:,} elements{written}{way_out}",)

@@ -17,6 +17,13 @@ class Connectivity:
     """
 
     def __init__(self, points: Float64, simplices: Int32, used: Int32, threads: int) -> None: ...
+    @staticmethod
+    def part(simplices: Int32, n: int, threads: int) -> Connectivity:
+        """A part of a mesh that has an order already: n vertices and simplices (m, d+1) that stay as they are.
+
+        Of what the facets tell, it has nothing.
+        """
+
     def flip(self, flipped: NDArray[np.bool_], threads: int) -> None:
         """Give some simplices (m,) the other orientation."""
 
@@ -113,6 +120,11 @@ def relocate(
     The threshold is that of the active-set method, or the floor of MEAN_RATIO and MEAN_ANGLE. Smoothing makes no
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
+
+def receive(
+    points: Float64, states: NDArray[np.uint8], mesh: Connectivity, vertices: Int32, positions: Float64
+) -> None:
+    """Put vertices (k,) that another process moved at their positions (k, d); what has such a neighbour is due."""
 
 def linear_program(
     neighbours: Float64, faces: NDArray[np.uint16], heights: bool

@@ -5,13 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass, fields, replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
+from click.core import ParameterSource
 
 from meshfix_cli import __version__
 from meshfix_cli.errors import MeshfixError
@@ -20,6 +23,9 @@ from meshfix_cli.repair import Files, Held, Judge, Method, repair
 from meshfix_cli.untangle import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+    from meshfix_cli.distributed import Root
     from meshfix_cli.mesh import Mesh
     from meshfix_cli.meshfile import Document
     from meshfix_cli.meshfile.formats import Format
@@ -287,6 +293,7 @@ def main() -> None:
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
 @click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
+@click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
 @_require
 @_holding
 @_reporting
@@ -298,6 +305,7 @@ def untangle(
     history: str | None,
     cells: str | None,
     allow_inverted: bool,
+    mpi: bool,
     requirements: tuple[Requirement, ...],
 ) -> None:
     """Move interior vertices until no element is inverted, then improve the worst angles.
@@ -310,17 +318,23 @@ def untangle(
     from meshfix_cli.meshfile import check_cells, write_text
     from meshfix_cli.report import console, history_csv, with_progress
 
-    document, output = _open(files, held, show, history, cells)
-    if cells is not None:
-        check_cells(document, cells)
-    watch = iter if show.quiet or show.as_json else partial(with_progress, out=console(sys.stderr))
-    report = repair(document, output, files, method, show.judge(requirements), watch)
-    if history is not None:
-        write_text(history, history_csv(report.records))
-    if cells is not None:
-        _write_cells(document, report.mesh, cells, show.threads)
-    show.print(report, _report_stream(files))
-    sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
+    if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
+        show = replace(show, threads=1)  # the launcher has a process for each core
+    with _processes(method, show.threads) if mpi else nullcontext() as root:
+        document, output = _open(files, held, show, history, cells)
+        if cells is not None:
+            check_cells(document, cells)
+        watch = iter if show.quiet or show.as_json else partial(with_progress, out=console(sys.stderr))
+        solve, put = (
+            (root.solve, root.put) if root else (partial(method.solve, threads=show.threads, watch=watch), None)
+        )
+        report = repair(document, output, files, method, show.judge(requirements), solve, put)
+        if history is not None:
+            write_text(history, history_csv(report.records))
+        if cells is not None:
+            _write_cells(document, report.mesh, cells, show.threads)
+        show.print(report, _report_stream(files))
+        sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 
 @main.command()
@@ -386,6 +400,51 @@ def quality(
         show.print(report, sys.stdout)
         codes.add(VALID if report.valid and report.met else INVERTED)
     sys.exit(max(codes) if ERROR not in codes else SOME_FAILED if len(sources) > 1 else ERROR)
+
+
+@contextmanager
+def _processes(method: Method, threads: int) -> Iterator[Root]:
+    """Give the root those that mpiexec has started; they work for it, and end as it does."""
+    from meshfix_cli.distributed import ROOT, Root, serve
+    from meshfix_cli.mpi import world
+
+    comm = world(_launched())
+    if comm.rank != ROOT:
+        try:
+            code = serve(comm, method, threads)
+        except BaseException as error:
+            _abort(comm, error)
+        sys.exit(code)
+    root, code = Root(comm, method, threads), ERROR
+    try:
+        yield root
+    except BaseException as error:
+        if root.busy:
+            _abort(comm, error)
+        if isinstance(error, SystemExit) and isinstance(error.code, int):
+            code = error.code
+        raise
+    finally:
+        root.dismiss(code)
+
+
+def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
+    """End all processes with the error of one: the others would wait for it for ever."""
+    if isinstance(error, (MeshfixError, MemoryError, OSError, SystemExit)):
+        _complain(f"process {comm.rank}: {str(error) or type(error).__name__}")
+    else:
+        traceback.print_exception(error)
+    sys.stderr.flush()
+    comm.Abort(ERROR)
+    raise AssertionError
+
+
+def _launched() -> int | None:
+    """How many processes the launcher says it has started."""
+    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"):
+        if name in os.environ:
+            return int(os.environ[name])
+    return None
 
 
 def _check_other(name: str, *meshes: str) -> None:

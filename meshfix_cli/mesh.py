@@ -212,6 +212,13 @@ class Mesh:
             raise ValueError(f"points have the shape {points.shape}, and this mesh {self.points.shape}")
         return replace(self, points=_read_only(np.ascontiguousarray(points)))
 
+    def with_vertices(self, positions: NDArray[np.float64]) -> Mesh:
+        """Return the same mesh with other positions (k, d) of the connectivity's vertices."""
+        points = self.topology.of_vertices(positions)
+        if len(positions) < len(points):  # isolated ones stay
+            points = np.where(self.topology.used[:, None], points, self.points)
+        return self.with_points(points)
+
     def with_fixed(self, fixed: NDArray[np.bool_]) -> Mesh:
         """Return the same mesh with more vertices fixed, `fixed` (n,) bool."""
         return replace(self, movable=_read_only(self.movable & ~fixed))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -17,11 +17,12 @@ from meshfix_cli.untangle import SMOOTH, collect, plan, steps
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh import Mesh
-    from meshfix_cli.meshfile import Document
+    from meshfix_cli.meshfile import Document, Put
     from meshfix_cli.meshfile.formats import Format
     from meshfix_cli.obstacles import Obstacles
     from meshfix_cli.quality import Requirement
     from meshfix_cli.report import Report
+    from meshfix_cli.team import Team
     from meshfix_cli.untangle import Outcome, SweepRecord
 
     Steps = Iterator[tuple[Mesh, SweepRecord]]
@@ -71,13 +72,15 @@ class Files:
             raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")
         return document, output
 
-    def write(self, document: Document, mesh: Mesh, output: Format) -> tuple[Mesh, tuple[str, ...]]:
+    def write(
+        self, document: Document, mesh: Mesh, output: Format, put: Put | None = None
+    ) -> tuple[Mesh, tuple[str, ...]]:
         """Write a moved mesh; return it as the file holds it, and what the user should know."""
         from meshfix_cli.meshfile import write
 
         if self.dry_run:
             return document.as_stored(mesh), ()
-        stored, dropped = write(document, mesh, self.target, output, self.backup)
+        stored, dropped = write(document, mesh, self.target, output, self.backup, put)
         if document.is_kept_by(output):
             return stored, ()
         if document.source.layout is None:
@@ -101,12 +104,16 @@ class Method:
         """Return how far vertices may move, in model units."""
         return math.inf if self.max_move is None else self.max_move.length(mesh, threads)
 
-    def steps(self, mesh: Mesh, reach: float, threads: int) -> Steps:
+    def steps(self, mesh: Mesh, reach: float, threads: int, team: Team | None = None) -> Steps:
         """Run the phases, see `untangle.steps`."""
         return steps(
             mesh, plan(self.strategy, self.smooth), sweeps=self.sweeps, threshold=self.threshold, max_move=reach,
-            only_invalid=self.only_invalid, threads=threads,
+            only_invalid=self.only_invalid, threads=threads, team=team,
         )  # fmt: skip
+
+    def solve(self, mesh: Mesh, reach: float, threads: int, watch: Callable[[Steps], Steps] = iter) -> Outcome:
+        """Run them to the end; `watch` passes the steps through, to show them."""
+        return collect(watch(self.steps(mesh, reach, threads)), threads)
 
 
 @dataclass(frozen=True)
@@ -168,7 +175,8 @@ def repair(
     files: Files,
     method: Method,
     judge: Judge,
-    watch: Callable[[Steps], Steps] = iter,
+    solve: Callable[[Mesh, float], Outcome] | None = None,
+    put: Put | None = None,
 ) -> Report:
     """Untangle and smooth a mesh, write it and report.
 
@@ -179,8 +187,10 @@ def repair(
     files : Files
     method : Method
     judge : Judge
-    watch : callable
-        Passes the steps through, to show them.
+    solve : callable
+        (mesh, how far vertices may move in model units) -> Outcome; default: `method.solve`.
+    put : callable
+        See `meshfile.write`.
 
     Raises
     ------
@@ -191,13 +201,15 @@ def repair(
 
     threads = judge.threads
     reach = method.reach(document.mesh, threads)
-    outcome = collect(watch(method.steps(document.mesh, reach, threads)), threads)
+    outcome = method.solve(document.mesh, reach, threads) if solve is None else solve(document.mesh, reach)
     meshes = outcome.after, outcome.untangled, outcome.before
     after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
-    result, written = files.write(document, after, output)
+    result, written = files.write(document, after, output, put)
     notes = (*_what_happened(document, method, outcome, after, rounded), *written)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
     facts: dict[str, Any] = {"strategy": method.strategy, "displacement": displacement(outcome.before, result)}
+    if outcome.ranks:
+        facts["ranks"] = [asdict(rank) for rank in outcome.ranks]
     if method.max_move is not None:
         facts["max_move"] = reach
     return judge.report("untangle", document, stages, notes, outcome.obstacles, records=outcome.records, facts=facts)

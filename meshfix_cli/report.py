@@ -115,6 +115,8 @@ def print_report(report: Report, out: Console) -> None:
     out.print(_quality_table(report))
     if report.records:
         line(_phases(report.records))
+    for rank, facts in enumerate((report.facts or {}).get("ranks", ())):
+        line(_process(rank, facts))
     for note in report.notes:
         line(f"note: {note}")
     for text in _verdict(report):
@@ -253,6 +255,12 @@ def _phases(records: Sequence[SweepRecord]) -> str:
             phases.setdefault(record.phase, []).append(record.seconds)
     parts = [f"{name}: {len(t)} sweep{'s' * (len(t) > 1)}, {sum(t):.3g} s" for name, t in phases.items()]
     return "; ".join(parts)
+
+
+def _process(rank: int, facts: Mapping[str, Any]) -> str:
+    memory = "" if facts["peak_mb"] is None else f", {facts['peak_mb']:,.0f} MB at most"
+    held = f"{facts['vertices']:,} vertices and {facts['ghosts']:,} ghosts"
+    return f"process {rank}: {held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
 
 
 def _verdict(report: Report) -> list[str]:

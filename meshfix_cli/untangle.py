@@ -10,10 +10,12 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from itertools import cycle, islice
+from functools import partial
+from itertools import chain, cycle, islice
 from typing import TYPE_CHECKING, Literal
 
 from meshfix_cli import _kernels
+from meshfix_cli.team import Alone
 
 if TYPE_CHECKING:
     import numpy as np
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
     from meshfix_cli.mesh import Mesh
     from meshfix_cli.obstacles import Obstacles
+    from meshfix_cli.team import Team
 
 SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
 SMOOTH = 3  # section 4: three passes of smoothing
@@ -30,6 +33,7 @@ SMOOTHING = "smoothing"
 RATIO_SWEEPS = 2  # of "best": later ones gain little
 ANGLE_SWEEPS = 3
 GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone
+ANGLE_STEPS = 2.0**32  # of a radian
 FLOOR = 1  # percentile of the smallest angles: the sweeps for the mean angle let no element fall below it
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
 RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
@@ -155,14 +159,40 @@ class SweepRecord:
 
 
 @dataclass(frozen=True)
+class RankRecord:
+    """What one of several processes held and sent.
+
+    Attributes
+    ----------
+    vertices, ghosts, elements : int
+        Its own vertices, those of others of which it had copies, and the elements of its stars.
+    peak_mb : float or None
+        The most memory it ever had, in 10^6 bytes; None: the system does not tell.
+    messages, megabytes : int, float
+        What it sent to others in the sweeps.
+    """
+
+    vertices: int
+    ghosts: int
+    elements: int
+    peak_mb: float | None
+    messages: int
+    megabytes: float
+
+
+@dataclass(frozen=True)
 class Outcome:
-    """A mesh before, after untangling and after smoothing, the record of every sweep, and what cannot be mended."""
+    """A mesh before, after untangling and after smoothing, the record of every sweep, and what cannot be mended.
+
+    `ranks` are the processes, where there were several.
+    """
 
     before: Mesh
     untangled: Mesh
     after: Mesh
     records: tuple[SweepRecord, ...]
     obstacles: Obstacles
+    ranks: tuple[RankRecord, ...] = ()
 
     @property
     def valid(self) -> bool:
@@ -195,6 +225,7 @@ def steps(
     max_move: float = math.inf,
     only_invalid: bool = False,
     threads: int = 1,
+    team: Team | None = None,
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
     """Run the phases; yield the mesh and a record as it came and after each sweep.
 
@@ -216,6 +247,8 @@ def steps(
     only_invalid : bool
         Move nothing but the stars of inverted elements and the rings around them, as many as it takes.
     threads : int
+    team : Team, optional
+        The processes of which each has a part of the mesh; the meshes are parts, the records are of the whole.
 
     Notes
     -----
@@ -224,11 +257,12 @@ def steps(
     degrees = THRESHOLD[mesh.dimension] if threshold is None else threshold
     if not (0 <= degrees <= 90 and max_move >= 0):
         raise ValueError("the threshold must be from 0 to 90 degrees, and max_move not negative")
-    run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, threads)
+    team = Alone(mesh, threads) if team is None else team
+    run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, threads, team)
     yield run.mesh, run.record
     phases = tuple(phases)
     to_the_ceiling = any(phase.until == "ceiling" for phase in phases)
-    if run.record.inverted == 0 and (only_invalid or (not to_the_ceiling and _meets_target(mesh, degrees, threads))):
+    if run.record.inverted == 0 and (only_invalid or (not to_the_ceiling and run.meets(degrees))):
         return
     for phase in phases:
         untangling = not phase.smooths
@@ -257,15 +291,6 @@ def steps(
         yield run.mesh, run.record
 
 
-def _meets_target(mesh: Mesh, degrees: float, threads: int) -> bool:
-    """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-    import numpy as np
-
-    free = np.delete(mesh.topology.connectivity.simplices, mesh.stuck(threads), axis=0)
-    smallest = _kernels.angles(mesh.along_curve(mesh.points), free, threads)[0]
-    return bool(smallest.min(initial=math.pi) >= math.radians(degrees))
-
-
 def _raised(sine2: float, degrees: float) -> float:
     """Return the sine^2 of an angle that is larger by some degrees."""
     return math.sin(min(math.asin(math.sqrt(sine2)) + math.radians(degrees), math.pi / 2)) ** 2
@@ -279,27 +304,28 @@ def _due(vertices: NDArray[np.bool_]) -> NDArray[np.uint8]:
 class _Run:
     """The positions between two sweeps, and the best so far by what can be mended: simplices that have a free vertex.
 
-    All arrays are in the order of `Topology.connectivity`.
+    All arrays are in the order of `Topology.connectivity`; of what several processes hold, `team` finds one answer.
     """
 
-    def __init__(self, mesh: Mesh, threshold_sine2: float, max_move: float, only_invalid: bool, threads: int) -> None:
+    def __init__(
+        self, mesh: Mesh, threshold_sine2: float, max_move: float, only_invalid: bool, threads: int, team: Team
+    ) -> None:
         import numpy as np
 
-        from meshfix_cli.foldover import Reach
-
         self.clock = time.perf_counter()
-        self.input, self.threshold_sine2, self.threads = mesh, threshold_sine2, threads
-        self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
+        self.input, self.threshold_sine2, self.threads, self.team = mesh, threshold_sine2, threads, team
+        self.stars, self.max_move = mesh.topology.stars(threads), max_move
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
-        self.reach = Reach(self.points, max_move)
         stuck = mesh.stuck(threads)
         fixed = self.stars.simplices[stuck]
         inverted = _kernels.check(self.points, fixed, threads)[0]
         self.stuck = np.delete(fixed, inverted, axis=0)
-        self.mendable = self.stars.simplices
+        self.mendable, self.own = self.stars.simplices, team.own_simplices
+        lost = int(self.own[stuck[inverted]].sum())
         if len(inverted):
             self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
-        self.beyond_repair = len(inverted), _kernels.check(self.points, fixed[inverted], threads)[1]
+            self.own = np.delete(self.own, stuck[inverted])
+        self.beyond_repair = team.total(lost), team.least(_kernels.check(self.points, fixed[inverted], threads)[1])
         self.changed = np.zeros(len(self.points), dtype=bool)
         self._check()
         self.record = self._record("input", 0, 0)
@@ -313,19 +339,7 @@ class _Run:
     @property
     def mesh(self) -> Mesh:
         """The mesh at these positions."""
-        import numpy as np
-
-        if self.points is self.first[0]:
-            return self.input
-        points = self.input.topology.of_vertices(self.points)
-        if len(self.points) < len(points):  # isolated ones stay
-            points = np.where(self.input.topology.used[:, None], points, self.input.points)
-        return self.input.with_points(points)
-
-    @property
-    def left(self) -> int:
-        """How many inverted simplices that can be mended there are."""
-        return len(self.inverted)
+        return self.input if self.points is self.first[0] else self.input.with_vertices(self.points)
 
     def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         """Yield the points after each sweep; the caller adds them before it asks for the next."""
@@ -343,7 +357,9 @@ class _Run:
         self.points = points
         self._check()
         sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
-        self.record = self._record(phase.name, sweep, int(self.changed.sum()))
+        self.record = self._record(
+            phase.name, sweep, self.team.total(int((self.changed & self.team.own_vertices).sum()))
+        )
         self.best = min(self.best, (self.points, self.record, self._rank()), key=lambda one: one[2])
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
@@ -351,11 +367,19 @@ class _Run:
 
     def gained(self) -> bool:
         """Whether the mean or the smallest of the smallest angles is larger than in the input, by more than `GAIN`."""
-        before, after = (
-            _kernels.angles(points, self.mendable, self.threads)[0] for points in (self.first[0], self.points)
-        )
-        gains = after.mean() - before.mean(), after.min() - before.min()
-        return bool(max(gains) > math.radians(GAIN))
+        before, after = self._angles(self.first[0]), self._angles(self.points)
+        # As integers, whose sum does not depend on the order.
+        steps = [int((angles * ANGLE_STEPS).astype("i8")[self.own].sum()) for angles in (before, after)]
+        mean = self.team.total(steps[1] - steps[0]) / ANGLE_STEPS / self.team.total(int(self.own.sum()))
+        rise = self._least(after) - self._least(before)
+        return max(mean, rise) > math.radians(GAIN)
+
+    def meets(self, degrees: float) -> bool:
+        """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
+        import numpy as np
+
+        free = np.delete(self.stars.simplices, self.input.stuck(self.threads), axis=0)
+        return self._least(_kernels.angles(self.points, free, self.threads)[0]) >= math.radians(degrees)
 
     def go_back(self, untangling: bool) -> bool:
         """Return to the best positions; False: they are the last.
@@ -373,8 +397,10 @@ class _Run:
         return True
 
     def _check(self) -> None:
-        """Find the inverted simplices, as rows of `mendable`, and the smallest measure."""
-        self.inverted, self.measure = _kernels.check(self.points, self.mendable, self.threads)
+        """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure."""
+        self.inverted, smallest = _kernels.check(self.points, self.mendable, self.threads)
+        self.left = self.team.total(int(self.own[self.inverted].sum()))
+        self.measure = self.team.least(smallest)
 
     def _rank(self) -> tuple[int, float]:
         return self.left, -self.measure
@@ -387,13 +413,14 @@ class _Run:
         """(n,) bool: the vertices of inverted simplices that can be mended."""
         mask = self.changed & False
         mask[self.mendable[self.inverted]] = True
-        return mask
+        return self.team.shared(mask)
 
     def _grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
         """(n,) bool: free vertices among these and `rings` rings of neighbours around them."""
         return self.free & self.stars.grown(vertices, rings).view(bool)
 
     def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        near = near & self.team.own_vertices
         threshold, states = self._threshold_sine2(phase), _due(near)
         for move in cycle(phase.moves):
             if len(phase.moves) > 1:  # what was visited by one move is due for the next
@@ -406,17 +433,17 @@ class _Run:
         ceiling = self._min_sine2(self.stuck)
         smallest, waited = self._min_sine2(self.mendable), 0
         while smallest < ceiling and waited < RAISE_PATIENCE:
-            yield self._relocated(move, _due(near), _raised(smallest, RAISE))
+            yield self._relocated(move, _due(near & self.team.own_vertices), _raised(smallest, RAISE))
             now = self._min_sine2(self.mendable)
             waited = 0 if now > _raised(smallest, RISE) else waited + 1
             smallest = max(smallest, now)
 
     def _relocated(self, move: Move, states: NDArray[np.uint8], threshold: float) -> NDArray[np.float64]:
         points = self.points.copy()
-        for blocks in self.colours:
+        for blocks in self.team.sweep(points, states):
             _kernels.relocate(
-                move, points, states, self.stars, blocks, threshold, self.min_measure, self.reach.start,
-                self.reach.distance, self.threads,
+                move, points, states, self.stars, blocks, threshold, self.min_measure, self.first[0], self.max_move,
+                self.threads,
             )  # fmt: skip
         return points
 
@@ -426,39 +453,66 @@ class _Run:
         if Move.MEAN_RATIO in phase.moves:
             floor = self._min_sine2(self.mendable)
         elif Move.MEAN_ANGLE in phase.moves:
-            import numpy as np
-
-            smallest = _kernels.angles(self.points, self.mendable, self.threads)[0]
-            floor = math.sin(np.percentile(smallest, FLOOR)) ** 2
+            floor = math.sin(self.team.ranked(self._angles(self.points)[self.own], FLOOR)) ** 2
         return max(self.threshold_sine2, floor)
 
     def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
-        return _kernels.min_sine2(self.points, simplices, self.threads)
+        return self.team.least(_kernels.min_sine2(self.points, simplices, self.threads))
+
+    def _angles(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the smallest angle of each simplex that can be mended, in radians."""
+        return _kernels.angles(points, self.mendable, self.threads)[0]
+
+    def _least(self, angles: NDArray[np.float64]) -> float:
+        return self.team.least(float(angles.min(initial=math.pi)))
 
     def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        from meshfix_cli.foldover import minimisations
+        compute = partial(_minimisations, phase.rings, self.max_move, self.threads)
+        return self.team.of_whole(compute, self.points, self.first[0], self.free, self._broken())
 
-        broken = self._broken()
-        for rings in phase.rings:
-            free = self.free if rings is None else self._grown(broken, rings)
-            if rings is not None and 2 * free.sum() > self.free.sum():
-                return  # as good as the whole mesh
-            yield from minimisations(self.points, self.stars, free, self.reach, self.threads)
+
+def _minimisations(
+    regions: tuple[int | None, ...],
+    max_move: float,
+    threads: int,
+    stars: _kernels.Connectivity,
+    points: NDArray[np.float64],
+    start: NDArray[np.float64],
+    free: NDArray[np.bool_],
+    broken: NDArray[np.bool_],
+) -> Iterator[NDArray[np.float64]]:
+    """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
+    from meshfix_cli.foldover import Reach, minimisations
+
+    for rings in regions:
+        near = free if rings is None else free & stars.grown(broken, rings).view(bool)
+        if rings is not None and 2 * near.sum() > free.sum():
+            return  # as good as the whole mesh
+        for moved in minimisations(points, stars, near, Reach(start, max_move), threads):
+            points = moved
+            yield points
 
 
 def collect(run: Iterator[tuple[Mesh, SweepRecord]], threads: int = 1) -> Outcome:
     """Find what cannot be mended, then drain the generator of `steps`."""
     from meshfix_cli.obstacles import find_obstacles
 
+    first = next(run)
+    obstacles = find_obstacles(first[0], threads)
+    return Outcome(*drain(chain([first], run)), obstacles)
+
+
+def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tuple[SweepRecord, ...]]:
+    """Take all steps; return the mesh as it came, untangled and smoothed, and the records."""
+    run = iter(run)
     mesh, record = next(run)
-    obstacles = find_obstacles(mesh, threads)
     before = untangled = mesh
     records = [record]
     for mesh, record in run:
         if not record.phase.startswith(SMOOTHING):
             untangled = mesh
         records.append(record)
-    return Outcome(before, untangled, mesh, tuple(records), obstacles)
+    return before, untangled, mesh, tuple(records)
 
 
 def untangle(

@@ -21,16 +21,32 @@ ALLOWED = {
     "quality": {"_kernels", "mesh"},
     "obstacles": {"_kernels", "mesh"},
     "foldover": {"_kernels", "mesh"},
-    "untangle": {"_kernels", "foldover", "mesh", "obstacles"},
+    "team": {"_kernels", "mesh"},
+    "untangle": {"_kernels", "foldover", "mesh", "obstacles", "team"},
     "perturb": {"mesh"},
     "meshfile": {"_kernels", "errors", "mesh"},
     "report": {"mesh", "obstacles", "quality", "untangle"},
+    "mpi": {"errors"},
+    "distributed": {"_kernels", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},
     "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "untangle"},
-    "cli": {"errors", "mesh", "meshfile", "perturb", "quality", "repair", "report", "untangle", "__init__"},
+    "cli": {
+        "distributed",
+        "errors",
+        "mesh",
+        "mpi",
+        "meshfile",
+        "perturb",
+        "quality",
+        "repair",
+        "report",
+        "untangle",
+        "__init__",
+    },
     "__init__": {"mesh", "meshfile", "perturb", "quality", "untangle"},
     "__main__": {"cli"},
 }
 OWNERS = {"rich": {"report"}, "scipy": {"foldover"}, "meshio": {"meshfile"}, "click": {"cli"}}
+OWNERS |= {"mpi4py": {"cli", "distributed", "mpi"}, "pymetis": {"distributed"}}
 
 
 def imports(path: Path) -> set[str]:

@@ -6,6 +6,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <memory>
 #include <numeric>
 #include <variant>
 
@@ -117,6 +118,15 @@ void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
                           static_cast<std::int64_t>(simplices.shape(0)),
                           std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
     });
+}
+
+PyConnectivity* part_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
+    auto self = std::make_unique<PyConnectivity>();
+    self->dimension = static_cast<int>(simplices.shape(1)) - 1;
+    self->mesh = with_dimension(simplices.shape(1) - 1, [&](auto d) {
+        return part_of_mesh<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n, threads);
+    });
+    return self.release();
 }
 
 void flip_py(PyConnectivity& self, const Vector<const bool>& flipped, int threads) {
@@ -270,6 +280,10 @@ auto check_simplices_py(const Matrix<const std::int32_t>& simplices, std::int64_
     return std::make_pair(first.outside, first.repeated);
 }
 
+StarsView stars_of(const Connectivity& mesh) {
+    return {mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(), mesh.neighbours.data()};
+}
+
 auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
                  const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
                  const Matrix<const double>& start, double max_move, int threads) {
@@ -279,13 +293,27 @@ auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8
     check_points(start, self);
     if (static_cast<std::int64_t>(states.shape(0)) != mesh.n()) throw nb::value_error("the states are of another mesh");
     const Counts counts = with_dimension(points.shape(1), [&](auto d) {
-        const StarsView view{mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(),
-                             mesh.neighbours.data()};
-        return relocate<d>(static_cast<Move>(move), view, points.data(), states.data(), mesh.n(), blocks.data(),
+        return relocate<d>(static_cast<Move>(move), stars_of(mesh), points.data(), states.data(), mesh.n(), blocks.data(),
                            static_cast<std::int64_t>(blocks.shape(0)),
                            Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
     });
     return std::make_pair(counts.visited, counts.moved);
+}
+
+// Vertices that others moved: where one is elsewhere, its neighbours are due again.
+void receive_py(const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
+                const Vector<const std::int32_t>& vertices, const Matrix<const double>& positions) {
+    const Connectivity& mesh = self.mesh;
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    check_points(points, self);
+    const std::size_t d = points.shape(1);
+    for (std::size_t i = 0; i < vertices.shape(0); ++i) {
+        double* here = points.data() + static_cast<std::size_t>(vertices(i)) * d;
+        const double* there = positions.data() + i * d;
+        if (std::equal(here, here + d, there)) continue;
+        std::copy(there, there + d, here);
+        make_neighbours_due(stars_of(mesh), states.data(), vertices(i));
+    }
 }
 
 auto check_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
@@ -576,6 +604,8 @@ MODULE(MESHFIX_MODULE, m) {
     m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a,
           "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
           "threads"_a);
+    m.def("receive", &receive_py, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a, "vertices"_a.noconvert(),
+          "positions"_a.noconvert());
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
@@ -602,6 +632,7 @@ MODULE(MESHFIX_MODULE, m) {
              "threads"_a)
         .def("__getstate__", &state_of)
         .def("__setstate__", &restore)
+        .def_static("part", &part_py, "simplices"_a.noconvert(), "n"_a, "threads"_a)
         .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
         .def("build_stars", &build_stars_py, "threads"_a)
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)

@@ -28,6 +28,14 @@ struct Parameters {
 // elsewhere a visit would find what the last one did.
 constexpr std::uint8_t HELD = 0, DONE = 1, DUE = 2;
 
+// Blocks of one colour may have neighbours in common, but read none of their states.
+inline void make_neighbours_due(const StarsView& stars, std::uint8_t* states, std::int64_t v) {
+    for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
+        std::uint8_t& state = states[stars.neighbours[i]];
+        if (load_relaxed(state) == DONE) store_relaxed(state, DUE);
+    }
+}
+
 struct Counts {
     std::int64_t visited = 0, moved = 0;
 };
@@ -60,13 +68,9 @@ struct Relocation {
         return changed;
     }
 
-    // Blocks of one colour may have neighbours in common, but read none of their states.
     void make_due(std::int64_t v) const {
         if (states[v] != HELD) states[v] = DUE;
-        for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
-            std::uint8_t& state = states[stars.neighbours[i]];
-            if (load_relaxed(state) == DONE) store_relaxed(state, DUE);
-        }
+        make_neighbours_due(stars, states, v);
     }
 
     // The last point in reach on the way to x. The smallest measure is concave (theorem 2.1) and the level sets of

@@ -11,6 +11,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <vector>
 
@@ -52,6 +53,21 @@ Connectivity connect(const double* points, std::int64_t n, const std::int32_t* s
     mesh.against = std::move(orientation.against);
     mesh.orientable = orientation.orientable;
     return mesh;
+}
+
+// A part of a mesh that has an order already: its vertices and simplices, as they come.
+template <int D>
+Connectivity part_of_mesh(const std::int32_t* simplices, std::int64_t m, std::int64_t n, int threads) {
+    Connectivity part;
+    part.simplices.assign(simplices, simplices + m * (D + 1));
+    part.vertices.resize(n);
+    part.rows.resize(m);
+    std::iota(part.vertices.begin(), part.vertices.end(), 0);
+    std::iota(part.rows.begin(), part.rows.end(), 0);
+    Incidence csr = incidence<D>(simplices, m, n, threads);
+    part.offsets = std::move(csr.offsets);
+    part.corners = std::move(csr.corners);
+    return part;
 }
 
 // Exchanges the first two vertices of some simplices: the other orientation. Before the stars are built.

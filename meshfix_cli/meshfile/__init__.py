@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,12 @@ from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_text
 from meshfix_cli.meshfile.document import SIMPLEX, Document, build, counted, with_reversed
 from meshfix_cli.meshfile.formats import Format
-from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
+from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing
 
 __all__ = [
     "Document",
+    "Put",
     "check_cells",
     "check_target",
     "is_stream",
@@ -33,6 +36,8 @@ __all__ = [
     "write_cells",
     "write_text",
 ]
+
+Put = Callable[[Path, Places, Points, NDArray[np.bool_]], None]
 
 ROUNDING = 1e-4  # relative to the size of the mesh: more than any format rounds, less than any mesh can bear
 
@@ -93,7 +98,12 @@ def read(
 
 
 def write(
-    document: Document, mesh: Mesh, target: str | os.PathLike[str], form: Format | None = None, backup: bool = False
+    document: Document,
+    mesh: Mesh,
+    target: str | os.PathLike[str],
+    form: Format | None = None,
+    backup: bool = False,
+    put: Put | None = None,
 ) -> tuple[Mesh, tuple[str, ...]]:
     """Write a moved mesh; return it as the file holds it, and what was dropped.
 
@@ -111,6 +121,8 @@ def write(
         Default: see `output_format`.
     backup : bool
         Keep what `target` was as `target.bak`, or, where that exists, `target.bak1` and so on.
+    put : callable, optional
+        (path, places, points, where they changed): writes the coordinates into a copy of a binary file.
 
     Raises
     ------
@@ -124,8 +136,7 @@ def write(
     stored = document.in_plane(points.astype(np.float64), mesh)
     layout = source.layout if form == document.format else None
     if layout is not None:
-        spliced = layout.rewritten(source.points, points, {})
-        write_file(target, lambda temporary: temporary.write_bytes(spliced), backup)
+        write_file(target, partial(_splice, layout, source.points, points, put), backup)
         return stored, ()
     dropped: tuple[str, ...] = ()
 
@@ -139,6 +150,14 @@ def write(
 
     write_file(target, produce, backup)
     return stored, dropped
+
+
+def _splice(layout: Layout, original: Points, points: Points, put: Put | None, path: Path) -> None:
+    if put is None or not (isinstance(layout, InPlace) and layout.binary):
+        path.write_bytes(layout.rewritten(original, points, {}))
+        return
+    path.write_bytes(layout.data)
+    put(path, layout.coordinates, points, differing(original, points))
 
 
 def write_cells(

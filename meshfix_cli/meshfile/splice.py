@@ -130,6 +130,11 @@ class InPlace:
     coordinates: Places
     corners: Sequence[Callable[[], Places]]
 
+    @property
+    def binary(self) -> bool:
+        """Whether the coordinates are, so that each has its bytes whatever it is."""
+        return self.coordinates.end is None
+
     def rounded(self, points: Points) -> Points:
         """Return points (n, d) as the file can hold them."""
         return self.coordinates.rounded(points)

@@ -321,6 +321,8 @@ def untangle(
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
     with _processes(method, show.threads) if mpi else nullcontext() as root:
+        if root and files.source == "-":
+            raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
         document, output = _open(files, held, show, history, cells)
         if cells is not None:
             check_cells(document, cells)
@@ -423,6 +425,8 @@ def _processes(method: Method, threads: int) -> Iterator[Root]:
             _abort(comm, error)
         if isinstance(error, SystemExit) and isinstance(error.code, int):
             code = error.code
+        elif isinstance(error, click.ClickException):
+            code = error.exit_code
         raise
     finally:
         root.dismiss(code)

@@ -10,12 +10,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import _kernels
+from meshfix_cli.errors import MeshfixError
 from meshfix_cli.mesh import Mesh, Topology
 from meshfix_cli.obstacles import find_obstacles
 from meshfix_cli.repair import Method
@@ -87,7 +89,15 @@ class Root:
         self.busy = False  # the others are at work, and would wait for ever if this process ended
 
     def solve(self, mesh: Mesh, reach: float) -> Outcome:
-        """Untangle a mesh; `reach`: how far vertices may move, in model units."""
+        """Untangle a mesh; `reach`: how far vertices may move, in model units.
+
+        Raises
+        ------
+        MeshfixError
+            pymetis is not installed.
+        """
+        if self.comm.size > 1 and find_spec("pymetis") is None:
+            raise MeshfixError("pymetis is not installed: pip install 'meshfix-cli[mpi]'")
         self._order("solve")
         own, self.owned = None, []
         for rank, part in enumerate(parts(mesh, self.comm.size, reach, self.threads)):
@@ -222,7 +232,7 @@ def partition(stars: _kernels.Connectivity, ranks: int) -> Numbers:
     ends = np.minimum(np.arange(1, blocks + 1) * _kernels.BLOCK_SIZE, len(stars.vertices))
     work = np.diff(stars.offsets[np.concatenate([[0], ends])])
     _, found = pymetis.part_graph(
-        ranks, xadj=offsets, adjncy=pairs % blocks, vweights=work, eweights=edges, contiguous=False
+        ranks, pymetis.CSRAdjacency(offsets, pairs % blocks), vweights=work, eweights=edges, contiguous=False
     )
     return np.asarray(found, dtype=np.int32)
 

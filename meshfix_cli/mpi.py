@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import TYPE_CHECKING
 
 from meshfix_cli.errors import MeshfixError
@@ -26,7 +27,9 @@ def world(launched: int | None) -> Intracomm:
         There is no mpi4py or no MPI library, or it does not know of the other processes.
     """
     try:
-        from mpi4py import MPI
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # of launchers: it is an error, below
+            from mpi4py import MPI
     except ImportError as error:
         raise MeshfixError(f"mpi4py is not installed: {INSTALL}") from error
     except RuntimeError as error:

@@ -27,8 +27,8 @@ ALLOWED = {
     "meshfile": {"_kernels", "errors", "mesh"},
     "report": {"mesh", "obstacles", "quality", "untangle"},
     "mpi": {"errors"},
-    "distributed": {"_kernels", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},
-    "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "untangle"},
+    "distributed": {"_kernels", "errors", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},
+    "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "team", "untangle"},
     "cli": {
         "distributed",
         "errors",

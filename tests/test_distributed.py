@@ -1,0 +1,246 @@
+"""One mesh over several processes: the bytes are those of one, and no process waits for ever."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import generate
+import meshio
+import numpy as np
+import pytest
+from conftest import SAMPLES, tangle
+from over_ranks import METHODS
+
+pytest.importorskip(
+    "pymetis", reason="without pymetis no mesh is shared among processes: pip install 'meshfix-cli[mpi]'"
+)
+from meshfix_cli import _kernels
+from meshfix_cli.distributed import Part, Ranks, partition, parts
+from meshfix_cli.mesh import Mesh
+
+BIN = Path(sys.executable).parent
+MESHFIX = [sys.executable, "-m", "meshfix_cli"]
+MPIEXEC = shutil.which("mpiexec", path=f"{BIN}{os.pathsep}{os.environ['PATH']}")
+needs_mpi = pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: pip install mpich")
+SOLVED = [name for name in METHODS if name != "fails"]
+
+
+def mpiexec(count: int, *command: object, code: int = 0, **options: Any) -> subprocess.CompletedProcess[str]:
+    words = [str(MPIEXEC), "-n", str(count), *map(str, command)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=120, **options)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done
+
+
+def sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.fixture(scope="module")
+def large(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """More than 300,000 tetrahedra, P=10, D=h, as binary VTK."""
+    mesh = tangle(Mesh.build(*generate.bracket(0.0355, 12)), 10, 1)
+    assert mesh.topology.m > 300_000
+    path = tmp_path_factory.mktemp("large") / "large.vtk"
+    cells = [("tetra", mesh.topology.simplices)]
+    meshio.write(path, meshio.Mesh(mesh.points, cells), file_format="vtk42", binary=True)
+    return path
+
+
+@needs_mpi
+def test_the_bytes_of_a_large_mesh_are_those_of_one_process(large: Path, tmp_path: Path) -> None:
+    serial = tmp_path / "serial.vtk"
+    subprocess.run([*MESHFIX, "untangle", "-q", large, serial], check=True)
+    assert serial.read_bytes() != large.read_bytes()
+    for ranks in (1, 2, 4):
+        for turn in range(2):
+            path = tmp_path / f"{ranks}-{turn}.vtk"
+            threads = ("--threads", 2) if turn else ()
+            done = mpiexec(ranks, *MESHFIX, "untangle", "--mpi", "--json", *threads, large, path)
+            assert sha256(path) == sha256(serial)
+            facts = json.loads(done.stdout)
+            assert len(facts["ranks"]) == ranks
+            assert sum(rank["vertices"] for rank in facts["ranks"]) == facts["vertices"]
+    peaks = [rank["peak_mb"] for rank in facts["ranks"]]
+    assert max(peaks[1:]) < peaks[0]  # only the reader has the whole
+
+
+@needs_mpi
+def test_every_move_has_the_bits_of_one_process() -> None:
+    done = mpiexec(3, sys.executable, Path(__file__).with_name("over_ranks.py"), *SOLVED)
+    assert done.stdout.split("\n")[:-1] == [f"{name} True" for name in SOLVED]
+
+
+def write(path: Path, form: str, mesh: Mesh, dtype: str, **options: object) -> None:
+    points = np.zeros((len(mesh.points), 3), dtype=dtype)
+    points[:, : mesh.dimension] = mesh.points
+    cells = [("triangle" if mesh.dimension == 2 else "tetra", mesh.topology.simplices)]
+    meshio.write(path, meshio.Mesh(points, cells), file_format=form, **options)
+
+
+@needs_mpi
+@pytest.mark.parametrize("name", ["double.vtk", "single.vtk", "text.vtk", "double.msh", "double.vtu", "skew.vtk"])
+def test_formats(name: str, tmp_path: Path, bracket: Mesh, plate: Mesh) -> None:
+    """In parts where the numbers are binary and stand in the file as they are, by the root elsewhere."""
+    path, form = tmp_path / name, {".vtk": "vtk42", ".msh": "gmsh", ".vtu": "vtu"}[Path(name).suffix]
+    mesh = tangle(plate if name == "skew.vtk" else bracket)
+    write(path, form, mesh, "f4" if name == "single.vtk" else "f8", binary=name != "text.vtk")
+    if name == "skew.vtk":
+        skew = meshio.read(path)
+        skew.points = skew.points @ np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+        meshio.write(path, skew, file_format="vtk42", binary=True)
+    serial, shared = tmp_path / f"serial-{name}", tmp_path / f"shared-{name}"
+    subprocess.run([*MESHFIX, "untangle", "-q", path, serial], check=True)
+    mpiexec(2, *MESHFIX, "untangle", "--mpi", "-q", path, shared)
+    assert shared.read_bytes() == serial.read_bytes()
+    mpiexec(2, *MESHFIX, "untangle", "--mpi", "-q", path, path)
+    assert path.read_bytes() == serial.read_bytes()
+
+
+@needs_mpi
+def test_stdout_and_the_report() -> None:
+    sample = SAMPLES / "bracket_tangled.vtk"
+    done = subprocess.run(
+        [str(MPIEXEC), "-n", "2", *MESHFIX, "untangle", "--mpi", sample], capture_output=True, check=True
+    )
+    alone = subprocess.run([*MESHFIX, "untangle", "-q", sample], capture_output=True, check=True)
+    assert done.stdout == alone.stdout
+    lines = done.stderr.decode().splitlines()
+    assert [line.split(":")[0] for line in lines if line.startswith("process ")] == ["process 0", "process 1"]
+    assert lines[-1] == "valid: no element is inverted"
+
+
+@needs_mpi
+def test_stdin_is_refused_once() -> None:
+    done = mpiexec(2, *MESHFIX, "untangle", "--mpi", code=2)
+    assert done.stderr.count("INPUT is a file") == 1
+
+
+@needs_mpi
+def test_an_error_is_one_line_and_ends_all(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.vtk"
+    bad.write_text("# vtk DataFile Version 3.0\nbad\nASCII\nDATASET UNSTRUCTURED_GRID\n")
+    done = mpiexec(3, *MESHFIX, "untangle", "--mpi", bad, tmp_path / "out.vtk", code=1)
+    assert done.stdout + done.stderr == f"meshfix: error: {bad}: is truncated: the section POINTS is missing\n"
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.vtk"]
+
+
+@needs_mpi
+def test_inverted_elements_that_remain_are_told_by_the_exit_code(tmp_path: Path) -> None:
+    mpiexec(2, *MESHFIX, "untangle", "--mpi", "-q", "--sweeps", 0, SAMPLES / "bracket_tangled.vtk",
+            tmp_path / "o.vtk", code=3)  # fmt: skip
+
+
+@needs_mpi
+def test_a_process_that_fails_in_a_sweep_ends_all() -> None:
+    done = mpiexec(3, sys.executable, "-c", FAILS, code=1)
+    assert "meshfix: error: process 2: MemoryError" in done.stderr
+
+
+# The command of the last process with a sweep that runs out of memory.
+FAILS = f"""
+import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})
+from over_ranks import Ranks, fail
+Ranks.sweep = fail
+from meshfix_cli.cli import main
+main(["untangle", "--mpi", "-q", "--dry-run", {str(SAMPLES / "bracket_tangled.vtk")!r}])
+"""
+
+
+@needs_mpi
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full")
+def test_a_disk_that_fills_up_while_parts_are_written_changes_nothing(tmp_path: Path, bracket: Mesh) -> None:
+    path = tmp_path / "mesh.vtk"
+    write(path, "vtk42", tangle(bracket), "f8", binary=True)
+    original = path.read_bytes()
+    done = mpiexec(2, sys.executable, "-c", FULL, path, code=1)
+    assert done.stderr.count("meshfix: error: ") == done.stderr.count("\n") == 1
+    assert path.read_bytes() == original
+    assert list(tmp_path.iterdir()) == [path]
+
+
+# The command with a disk that has no room left when the coordinates are put into the copy.
+FULL = """
+import sys
+from pathlib import Path
+from meshfix_cli.distributed import Root
+put = Root.put
+Root.put = lambda self, path, *rest: put(self, Path("/dev/full"), *rest)
+from meshfix_cli.cli import main
+main(["untangle", "--mpi", "-q", sys.argv[1], sys.argv[1]])
+"""
+
+
+def failing(environment: dict[str, str], *prefix: str) -> str:
+    words = prefix or MESHFIX
+    command = [*words, "untangle", "--mpi", "-q", "--dry-run", str(SAMPLES / "plate_tangled.vtk")]
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, timeout=60, env={**os.environ, **environment}
+    )
+    assert done.returncode == 1, done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+    return done.stderr
+
+
+def test_the_launcher_of_another_mpi_is_refused() -> None:
+    pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+    assert "the launcher started 4 processes" in failing({"OMPI_COMM_WORLD_SIZE": "4"})
+
+
+def test_a_missing_mpi_library_or_package_is_named() -> None:
+    pytest.importorskip("mpi4py", reason="mpi4py is not installed")
+    assert "pip install mpi4py mpich" in failing({"MPI4PY_LIBMPI": "/nowhere/libmpi.so"})
+    hidden = "import sys; sys.modules['mpi4py'] = None; from meshfix_cli.cli import main; main()"
+    assert "mpi4py is not installed" in failing({}, sys.executable, "-c", hidden)
+    hidden = hidden.replace("mpi4py", "pymetis")
+    if MPIEXEC is not None:
+        assert "pymetis is not installed" in failing({}, MPIEXEC, "-n", "2", sys.executable, "-c", hidden)
+
+
+def all_parts(mesh: Mesh, ranks: int) -> list[Part]:
+    return list(parts(mesh, ranks, np.inf, 1))
+
+
+@pytest.mark.parametrize("ranks", [1, 2, 3, 5, 40])
+def test_parts_are_whole_blocks_and_one_layer_of_ghosts(fine: Mesh, ranks: int) -> None:
+    """By definition, against sets of Python."""
+    stars = fine.topology.stars()
+    found = all_parts(fine, ranks)
+    own = [set(part.vertices[: part.own].tolist()) for part in found]
+    assert sum(map(len, own)) == len(set().union(*own)) == len(stars.vertices)
+    simplices = 0
+    for part, mine in zip(found, own, strict=True):
+        here = np.isin(stars.simplices, list(mine)).any(axis=1)
+        np.testing.assert_array_equal(part.vertices[part.simplices], stars.simplices[here])
+        assert set(part.vertices[part.own :].tolist()) == set(stars.simplices[here].ravel().tolist()) - mine
+        assert (np.diff(part.vertices[: part.own]) > 0).all()
+        for ghost, owner in zip(part.vertices[part.own :].tolist(), part.owners.tolist(), strict=True):
+            assert ghost in own[owner]
+        simplices += int(part.own_simplices.sum())
+    assert simplices == fine.topology.m
+
+
+def test_the_partition_is_balanced(fine: Mesh) -> None:
+    stars = fine.topology.stars()
+    blocks = partition(stars, 3)
+    assert set(blocks.tolist()) == {0, 1, 2}
+    work = np.bincount(blocks, weights=np.diff(stars.offsets[:: _kernels.BLOCK_SIZE], append=len(stars.corners)))
+    assert work.max() <= 1.2 * work.mean()
+
+
+def test_a_rank_among_values_is_found_by_bisection(
+    random: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    team: Any = object.__new__(Ranks)
+    monkeypatch.setattr(team, "total", lambda count: count, raising=False)
+    for values in (random.random(1001), np.zeros(7), np.array([0.0, -0.0, 1e-300, 3.0]), random.random(1)):
+        for percent in (0, 1, 37.5, 100):
+            rank = int(percent / 100 * (len(values) - 1))
+            assert team.ranked(values, percent) == np.sort(values)[rank]

@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
-.PHONY: help demo test lint check sanitize fuzz stress bench compare tables samples clean
+.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -61,6 +61,9 @@ bench: $(VENV)/installed ## kernels, with MESH=FILE for a mesh of yours; the who
 	$(BIN)/python benchmarks/kernels.py $(MESH)
 	$(BIN)/python benchmarks/process.py
 	$(BIN)/python benchmarks/files.py
+
+scaling: $(VENV)/developer ## one mesh over 1, 2 and 4 processes, and a prediction for larger machines
+	$(BIN)/python benchmarks/scaling.py
 
 compare: $(VENV)/developer ## beside gmsh's UntangleMeshGeometry; MESH=FILE or TETS=1000000 for a larger mesh
 	$(BIN)/python benchmarks/compare.py $(MESH) $(if $(TETS),--tets $(TETS))

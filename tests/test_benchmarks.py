@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 import sys
 from pathlib import Path
 
@@ -94,3 +95,14 @@ def test_comparison_with_gmsh(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     monkeypatch.setattr(sys, "argv", ["compare.py", "--tets", "3000"])
     compare.main()
     assert capsys.readouterr().out.count("box with holes, P=10 D=1h") == 4
+
+
+def test_scaling_is_measured_and_predicted(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("pymetis", reason="without pymetis no mesh is shared among processes")
+    scaling = pytest.importorskip("scaling")
+    if shutil.which(scaling.MPIEXEC) is None:
+        pytest.skip("there is no mpiexec: pip install mpich")
+    monkeypatch.setattr(sys, "argv", ["scaling.py", "--tets", "20000", "--ranks", "1", "2", "--repeats", "1"])
+    scaling.main()
+    printed = capsys.readouterr().out
+    assert all(words in printed for words in ("strong scaling", "weak scaling", "predicted, 1,000,000,000"))

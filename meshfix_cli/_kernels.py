@@ -10,3 +10,4 @@ except ImportError:  # the compiler could not build it
     _built = _any
 
 globals().update({name: value for name, value in vars(_built).items() if not name.startswith("__")})
+BUILD = "AVX2" if _built is not _any else "any processor"

@@ -7,6 +7,7 @@ Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
 
+BUILD: str  # what processors these are for
 DUE: int
 BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
 

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from meshfix_cli.quality import Requirement
     from meshfix_cli.report import Report
 
+_FILE = click.Path(allow_dash=True)  # shells complete it; whether it exists, its reader tells
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
 
 
@@ -229,8 +230,8 @@ _reporting = _packed(
 _writing = _packed(
     "files",
     Files,
-    click.argument("source", metavar="[INPUT]", default="-"),
-    click.argument("target", metavar="[OUTPUT]", default="-"),
+    click.argument("source", metavar="[INPUT]", default="-", type=_FILE),
+    click.argument("target", metavar="[OUTPUT]", default="-", type=_FILE),
     click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
     click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
     click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
@@ -276,8 +277,30 @@ _require = click.option(
 )
 
 
+def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if not wanted or ctx.resilient_parsing:
+        return
+    import platform
+    from importlib.metadata import version
+
+    from meshfix_cli._kernels import BUILD
+
+    libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "meshio"))
+    threads = f"{_cores()} thread{'s' * (_cores() > 1)}"
+    python = f"Python {platform.python_version()}, {libraries}"
+    click.echo(f"meshfix {__version__} (kernels for {BUILD}, {threads}; {python})")
+    ctx.exit()
+
+
 @click.group(cls=_Group, context_settings={"help_option_names": ["-h", "--help"]})
-@click.version_option(__version__, prog_name="meshfix")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_print_version,
+    help="Show the version, and what it runs with.",
+)
 def main() -> None:
     """Repair tangled triangle and tetrahedral meshes by moving interior vertices.
 
@@ -293,6 +316,7 @@ def main() -> None:
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
 @click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
+@click.option("--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes.")
 @click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
 @_require
 @_holding
@@ -305,6 +329,7 @@ def untangle(
     history: str | None,
     cells: str | None,
     allow_inverted: bool,
+    verbose: bool,
     mpi: bool,
     requirements: tuple[Requirement, ...],
 ) -> None:
@@ -318,6 +343,8 @@ def untangle(
     from meshfix_cli.meshfile import check_cells, write_text
     from meshfix_cli.report import console, history_csv, with_progress
 
+    if verbose and show.quiet:
+        raise click.UsageError("--quiet and --verbose exclude each other")
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
     with _processes(method, show.threads) if mpi else nullcontext() as root:
@@ -326,7 +353,8 @@ def untangle(
         document, output = _open(files, held, show, history, cells)
         if cells is not None:
             check_cells(document, cells)
-        watch = iter if show.quiet or show.as_json else partial(with_progress, out=console(sys.stderr))
+        silent = show.quiet or (show.as_json and not verbose)
+        watch = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
         solve, put = (
             (root.solve, root.put) if root else (partial(method.solve, threads=show.threads, watch=watch), None)
         )
@@ -364,7 +392,7 @@ def perturb(files: Files, held: Held, show: _Show, percent: float, dist: Distanc
 
 
 @main.command()
-@click.argument("sources", metavar="INPUT...", nargs=-1, required=True)
+@click.argument("sources", metavar="INPUT...", nargs=-1, required=True, type=_FILE)
 @_cells
 @click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
 @_require

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
 LISTED = 10  # inverted elements named in the report
 
+MEASURE_NAMES = {2: "area", 3: "volume"}
 _BARS = " ▁▂▃▄▅▆▇█"
 
 
@@ -114,7 +116,8 @@ def print_report(report: Report, out: Console) -> None:
     line(_title(report))
     out.print(_quality_table(report))
     if report.records:
-        line(_phases(report.records))
+        for text in _phases(report):
+            line(text)
     for rank, facts in enumerate((report.facts or {}).get("ranks", ())):
         line(_process(rank, facts))
     for note in report.notes:
@@ -173,15 +176,29 @@ def history_csv(records: Iterable[SweepRecord]) -> str:
     return "\n".join(lines + [",".join(str(value) for value in row.values()) for row in rows]) + "\n"
 
 
-def with_progress(run: Iterable[tuple[Mesh, SweepRecord]], out: Console) -> Iterator[tuple[Mesh, SweepRecord]]:
-    """Pass the steps through and show each on a terminal as it comes; the line is gone at the end."""
-    if not out.is_terminal:
+def with_progress(
+    run: Iterable[tuple[Mesh, SweepRecord]], out: Console, every_sweep: bool = False
+) -> Iterator[tuple[Mesh, SweepRecord]]:
+    """Pass the steps through and show them as they come: on a terminal one live line, which is gone at the end.
+
+    `every_sweep`: a plain line for each of them as well.
+    """
+    if not (out.is_terminal or every_sweep):
         yield from run
         return
-    with out.status("building the topology") as status:
+    with out.status("building the topology") if out.is_terminal else nullcontext() as status:
         for mesh, record in run:
-            status.update(f"{record.phase} {record.sweep}: {record.inverted:,} inverted")
+            text = _sweep(record, mesh.dimension)
+            if status is not None:
+                status.update(text)
+            if every_sweep:
+                out.print(Text(f"{text}, {record.moved:,} vertices moved, {record.seconds:.3g} s"), soft_wrap=True)
             yield mesh, record
+
+
+def _sweep(record: SweepRecord, dimension: int) -> str:
+    name = f"{record.phase} {record.sweep}" if record.sweep else record.phase
+    return f"{name}: {record.inverted:,} inverted, smallest {MEASURE_NAMES[dimension]} {record.min_measure:.3g}"
 
 
 def _summary_json(summary: Summary) -> dict[str, Any]:
@@ -225,7 +242,7 @@ def _quality_table(report: Report) -> Table:
 
     row("inverted elements", ",", "inverted")
     row("folded interior faces" if mesh.dimension == 3 else "folded interior edges", ",", "folded")
-    row("smallest area" if mesh.dimension == 2 else "smallest volume", ".3g", "min_measure")
+    row(f"smallest {MEASURE_NAMES[mesh.dimension]}", ".3g", "min_measure")
     row(f"smallest {angle} [°]", ".3f", "min_angle")
     row(f"largest {angle} [°]", ".3f", "max_angle")
     row(f"mean smallest {angle} [°]", ".2f", "mean_min_angle")
@@ -247,14 +264,16 @@ def _bars(histogram: Sequence[int]) -> str:
     return "".join(_BARS[-(-count * (len(_BARS) - 1) // top)] for count in histogram)
 
 
-def _phases(records: Sequence[SweepRecord]) -> str:
-    """Sweeps and seconds of each phase, in order."""
-    phases: dict[str, list[float]] = {}
-    for record in records:
+def _phases(report: Report) -> Iterator[str]:
+    """A line for each phase: its sweeps, what is left after the last, and seconds."""
+    phases: dict[str, list[SweepRecord]] = {}
+    for record in report.records:
         if record.sweep and record.phase != "best":
-            phases.setdefault(record.phase, []).append(record.seconds)
-    parts = [f"{name}: {len(t)} sweep{'s' * (len(t) > 1)}, {sum(t):.3g} s" for name, t in phases.items()]
-    return "; ".join(parts)
+            phases.setdefault(record.phase, []).append(record)
+    for name, records in phases.items():
+        left, sweeps, seconds = records[-1], len(records), sum(record.seconds for record in records)
+        measure = f"smallest {MEASURE_NAMES[report.mesh.dimension]} {left.min_measure:.3g}"
+        yield f"{name}: {sweeps} sweep{'s' * (sweeps > 1)}, {left.inverted:,} inverted, {measure}, {seconds:.3g} s"
 
 
 def _process(rank: int, facts: Mapping[str, Any]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -14,7 +15,7 @@ import pytest
 from click.testing import CliRunner
 from conftest import SAMPLES, tangle
 
-from meshfix_cli import read
+from meshfix_cli import __version__, read
 from meshfix_cli.cli import main
 from meshfix_cli.mesh import Mesh
 from meshfix_cli.quality import METRICS, summarise
@@ -602,4 +603,41 @@ def test_help_of_every_command_names_every_option_and_strategy() -> None:
 
 def test_python_dash_m() -> None:
     done = subprocess.run([sys.executable, "-m", "meshfix_cli", "--version"], capture_output=True, check=True, cwd="/")
-    assert done.stdout.startswith(b"meshfix, version ")
+    assert done.stdout == run("--version").stdout
+
+
+def test_the_version_tells_the_kernels_and_the_threads() -> None:
+    text = run("--version").stdout.decode()
+    assert re.fullmatch(rf"meshfix {__version__} \(kernels for (AVX2|any processor), \d+ threads?; Python .*\)\n", text)
+
+
+def test_verbose_shows_each_sweep_and_the_report_each_phase(tmp_path: Path) -> None:
+    done = run("untangle", "--verbose", "--history", tmp_path / "h.csv", TANGLED, tmp_path / "o.vtk")
+    rows = (tmp_path / "h.csv").read_text().splitlines()[1:]
+    lines = done.stderr.decode().splitlines()
+    assert len(lines) == len(rows)
+    assert lines[0].startswith("input: 89 inverted, smallest area -0.168")
+    for line, row in zip(lines[1:], rows[1:], strict=True):
+        phase, sweep, inverted, _, moved, _ = row.split(",")
+        assert line.startswith(f"{phase} {sweep}: {inverted} inverted")
+        assert f"{moved} vertices moved" in line
+    phases = [line for line in done.stdout.decode().splitlines() if re.match("(Laplacian|smoothing): ", line)]
+    assert [re.sub(r", [\d.e-]+ s$", "", line) for line in phases] == [
+        "Laplacian: 1 sweep, 0 inverted, smallest area 0.00154",
+        "smoothing: 3 sweeps, 0 inverted, smallest area 0.00822",
+    ]
+    run("untangle", "--verbose", "--quiet", TANGLED, tmp_path / "o.vtk", code=2)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_complete_options_and_files(shell: str) -> None:
+    """As click has it: the shell runs the command with a variable."""
+    source = subprocess.run(
+        [MESHFIX], env={**os.environ, "_MESHFIX_COMPLETE": f"{shell}_source"}, capture_output=True, check=True
+    )
+    assert b"_MESHFIX_COMPLETE" in source.stdout
+    for words, expected in (("meshfix untangle --stra", b"--strategy"), ("meshfix untangle --strategy L", b"LUS")):
+        variables = {"COMP_WORDS": words, "COMP_CWORD": str(words.count(" ")), "_MESHFIX_COMPLETE": f"{shell}_complete"}
+        variables["COMP_CWORD"] = words.split()[-1] if shell == "fish" else variables["COMP_CWORD"]
+        done = subprocess.run([MESHFIX], env={**os.environ, **variables}, capture_output=True, check=True)
+        assert expected in done.stdout

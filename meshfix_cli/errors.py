@@ -6,6 +6,9 @@ MeshfixError
 └── WriteError          the result cannot be written
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 
 class MeshfixError(Exception):
     """Base of all errors; its text is one clear line for the user."""
@@ -21,3 +24,12 @@ class ReadError(MeshfixError):
 
 class WriteError(MeshfixError):
     """The result cannot be written; nothing was."""
+
+
+@contextmanager
+def naming(name: str) -> Iterator[None]:
+    """Let errors begin with the name of the file that they are about."""
+    try:
+        yield
+    except MeshfixError as error:
+        raise type(error)(f"{name}: {error}") from error

@@ -7,7 +7,7 @@ import os
 import stat
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import count
 from pathlib import Path
 
@@ -39,17 +39,70 @@ def write_file(target: str, produce: Callable[[Path], object], backup: bool = Fa
     """
     streamed = is_stream(target)
     path = Path(target) if streamed else Path(target).resolve()
+    parent = None if streamed else path.parent
+    with _sentence(target), tempfile.TemporaryDirectory(prefix=".meshfix-", dir=parent) as folder:
+        temporary = Path(folder) / (path.name if path.suffix else "mesh")
+        produce(temporary)
+        if target == "-":
+            sys.stdout.buffer.write(temporary.read_bytes())
+            sys.stdout.buffer.flush()
+        elif streamed:
+            path.write_bytes(temporary.read_bytes())
+        else:
+            _complete(temporary, path)
+            if backup:
+                _keep(path)
+            _replace(temporary, path)
+
+
+def write_files(contents: Iterable[tuple[str, bytes]], backup: bool = False) -> None:
+    """Replace several files, each at once, in the order given, and the first when all of them are complete.
+
+    The folder of a target is made where there is none. With `backup` each file that was there stays as `write_file`
+    keeps it.
+    """
+    with contextlib.ExitStack() as stack:
+        ready = [_stage(stack, target, data) for target, data in contents]
+        for _, path in ready if backup else ():
+            with _sentence(str(path)):
+                _keep(path)
+        try:
+            _replace_all(ready)
+        except SystemExit:  # a signal between two of them: the rest takes no time, and a mixture is no mesh
+            _replace_all(ready)
+            raise
+
+
+def _stage(stack: contextlib.ExitStack, target: str, data: bytes) -> tuple[Path, Path]:
+    """Write a temporary file that goes away with the stack; return where it is, and the path that it is for."""
+    path = Path(target).resolve()
+    with _sentence(target):
+        for missing in [folder for folder in reversed(path.parents) if not folder.exists()]:
+            missing.mkdir()
+            stack.callback(_remove_empty, missing)
+        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix=".meshfix-", dir=path.parent))
+        temporary = Path(folder) / path.name
+        temporary.write_bytes(data)
+        _complete(temporary, path)
+    return temporary, path
+
+
+def _replace_all(ready: Iterable[tuple[Path, Path]]) -> None:
+    for temporary, path in ready:
+        if temporary.exists():
+            with _sentence(str(path)):
+                _replace(temporary, path)
+
+
+def _remove_empty(folder: Path) -> None:
+    with contextlib.suppress(OSError):
+        folder.rmdir()
+
+
+@contextlib.contextmanager
+def _sentence(target: str) -> Iterator[None]:
     try:
-        with tempfile.TemporaryDirectory(prefix=".meshfix-", dir=None if streamed else path.parent) as folder:
-            temporary = Path(folder) / (path.name if path.suffix else "mesh")
-            produce(temporary)
-            if target == "-":
-                sys.stdout.buffer.write(temporary.read_bytes())
-                sys.stdout.buffer.flush()
-            elif streamed:
-                path.write_bytes(temporary.read_bytes())
-            else:
-                _replace(temporary, path, backup)
+        yield
     except BrokenPipeError:  # nobody reads stdout any more: the command line knows what that means
         raise
     except OSError as error:
@@ -62,12 +115,14 @@ def write_text(target: str, text: str) -> None:
     write_file(target, lambda temporary: temporary.write_text(text))
 
 
-def _replace(temporary: Path, path: Path, backup: bool) -> None:
+def _complete(temporary: Path, path: Path) -> None:
+    """Give a file the mode of the one that it will replace, and see that it is on the disk."""
     temporary.chmod(stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask())
     with temporary.open("rb") as written:
         os.fsync(written.fileno())
-    if backup and path.exists():
-        _keep(path)
+
+
+def _replace(temporary: Path, path: Path) -> None:
     temporary.replace(path)
     if os.name == "posix":  # the rename is done; what is left is that a crash of the machine does not undo it
         with contextlib.suppress(OSError):
@@ -79,8 +134,8 @@ def _replace(temporary: Path, path: Path, backup: bool) -> None:
 
 
 def _keep(path: Path) -> None:
-    """Give a file a second name that no other file has; the rename takes the first one away."""
-    for number in count():
+    """Give a file, if there is one, a second name that no other has; the rename takes the first one away."""
+    for number in count() if path.exists() else ():
         try:
             path.with_name(f"{path.name}.bak{number or ''}").hardlink_to(path)
         except FileExistsError:

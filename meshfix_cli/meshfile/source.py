@@ -7,12 +7,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.meshfile.splice import Points
+
+if TYPE_CHECKING:
+    from meshfix_cli.meshfile.pieces import Pieces
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
 REGIONS = (
@@ -21,6 +24,7 @@ REGIONS = (
 )  # fmt: skip
 
 
+SIMPLEX = {2: "triangle", 3: "tetra"}  # what is solved for, by its dimension
 _SOLID = re.compile(r"(?:VTK_[A-Z]+_)?(?:tetra|hexa|wedge|pyramid|penta|voxel|polyhedron)", re.IGNORECASE)
 
 
@@ -36,11 +40,14 @@ class Cells:
         Rows of the points; a list of arrays where the cells have different numbers of vertices.
     ids : (m,) int64 or None
         The numbers that the file gives to them.
+    ghosts : (m,) bool or None
+        Cells that another piece of the mesh has as well.
     """
 
     type: str
     vertices: Any
     ids: NDArray[np.int64] | None = None
+    ghosts: NDArray[np.bool_] | None = None
 
     @property
     def solid(self) -> bool:
@@ -96,7 +103,6 @@ class Source:
         d = 2 or 3 as in the file.
     cells : sequence of Cells
     layout : Layout or None
-        None: the file can only be written anew.
     load : callable
         Gives the arrays; they are read when they are asked for.
     regions : tuple of str
@@ -107,6 +113,11 @@ class Source:
         What the file holds beside `arrays`, and no other format would: comments, sections, keywords.
     notes : tuple of str
         What a user should know about the file, a sentence each.
+    numbers : callable
+        Gives the numbers (n,) int64 of the points, by which pieces of a mesh tell which of them are the same; None:
+        the file has none.
+    pieces : Pieces or None
+        What stands for the layout where the mesh lies in several files. With neither it can only be written anew.
     """
 
     points: Points
@@ -117,6 +128,13 @@ class Source:
     held: NDArray[np.bool_] | None = None
     untold: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    numbers: Callable[[], NDArray[np.int64] | None] = lambda: None
+    pieces: Pieces | None = None
+
+    @property
+    def spliced(self) -> bool:
+        """Whether all but the coordinates can be written back as it was."""
+        return self.layout is not None or self.pieces is not None
 
     @cached_property
     def arrays(self) -> Arrays:
@@ -125,7 +143,8 @@ class Source:
 
     def rounded(self, points: Points) -> Points:
         """Return points (n, d) as the file can hold them."""
-        return points if self.layout is None else self.layout.rounded(points)
+        layout = self.pieces or self.layout
+        return points if layout is None else layout.rounded(points)
 
     def vertices_of(self, kind: str, corners: int) -> NDArray[np.int64]:
         """Return the vertices (k, corners) of all cells of a type, in the order of the file."""
@@ -166,6 +185,17 @@ class Source:
         held = {*theirs.groups, *theirs.point_sets, *theirs.cell_sets}
         lost += [f"group {name}" for name in (*mine.groups, *mine.point_sets, *mine.cell_sets) if name not in held]
         return (*dict.fromkeys((*lost, *mine.unread)), *self.untold)
+
+
+def ghost_vertices(cells: Sequence[Cells], n: int) -> NDArray[np.bool_] | None:
+    """Mark the points (n,) of ghost cells; None: no cells are marked so."""
+    if all(run.ghosts is None for run in cells):
+        return None
+    mask = np.zeros(n, dtype=bool)
+    for run in cells:
+        vertices = run.vertices[run.ghosts] if run.ghosts is not None else np.empty(0, dtype=np.int64)
+        mask[vertices[(vertices >= 0) & (vertices < n)]] = True
+    return mask
 
 
 def _joined(parts: Sequence[Any]) -> Any:

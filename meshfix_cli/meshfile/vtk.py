@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.vtk_cells import TYPES, Run, markings, runs
 from meshfix_cli.meshfile.vtk_sections import Array, Sections, find_sections
@@ -39,13 +39,13 @@ def parse(data: bytes) -> Source | None:
     if points.kind not in ("f4", "f8"):
         return None
     pairs = [(table, run) for table in _tables(found) for run in runs(table.types, table.offsets, table.vertices)]
-    cells = [_cells(table, run) for table, run in pairs]
     coordinates = points.places(np.arange(points.size).reshape(-1, 3))
     layout = InPlace(data, coordinates, [partial(table.places, run) for table, run in pairs])
     load = cache(partial(_arrays, found, points.tuples, [table.first + run.rows for table, run in pairs]))
     named = {array.name for array in found.arrays[b"cell_data"]}
     damaged = "is not a readable vtk file: its cell data {} cannot be read"
-    regions, held = markings(named, lambda: load().cell, [run for _, run in pairs], points.tuples, damaged)
+    regions, cells = markings(named, [_cells(table, run) for table, run in pairs], lambda: load().cell, damaged)
+    held = ghost_vertices(cells, points.tuples)
     untold = dict.fromkeys(["field data"] * bool(found.arrays[b"dataset"]) + found.untold)
     return Source(points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold))
 

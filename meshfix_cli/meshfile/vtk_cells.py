@@ -6,6 +6,7 @@ Source: VTK, "vtkCellType.h".
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,12 +97,11 @@ def runs(
 
 def markings(
     names: Set[str],
+    cells: Sequence[Cells],
     cell: Callable[[], Mapping[str, Sequence[NDArray[Any]]]],
-    found: Sequence[Run],
-    n: int,
     damaged: str,
-) -> tuple[tuple[str, ...], NDArray[np.bool_] | None]:
-    """Return which cell arrays tell materials apart, and the vertices (n,) of ghost cells, if cells are marked so.
+) -> tuple[tuple[str, ...], list[Cells]]:
+    """Return which cell arrays tell materials apart, and the runs of cells with their ghosts marked.
 
     Parameters
     ----------
@@ -114,17 +114,10 @@ def markings(
     for name in (*regions, *marks):
         if name not in cell():
             raise ReadError(damaged.format(repr(name)))
-    return regions, _ghosts(cell(), found, n) if marks else None
-
-
-def _ghosts(cell: Mapping[str, Sequence[NDArray[Any]]], found: Sequence[Run], n: int) -> NDArray[np.bool_]:
-    """Mark the vertices of cells that another piece, or another file, has as well."""
-    held = np.zeros(n, dtype=bool)
-    for name in GHOSTS & cell.keys():
-        for run, marks in zip(found, cell[name], strict=True):
-            vertices = run.vertices[marks != 0]
-            held[vertices[(vertices >= 0) & (vertices < n)]] = True
-    return held
+    if not marks:
+        return regions, list(cells)
+    ghosts = [np.any([cell()[name][i] != 0 for name in marks], axis=0) for i in range(len(cells))]
+    return regions, [replace(run, ghosts=mask) for run, mask in zip(cells, ghosts, strict=True)]
 
 
 def _same(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> Sequence[NDArray[np.int64]]:

@@ -19,11 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import Arrays, Source
+from meshfix_cli.meshfile.source import Arrays, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import Points, differing
 from meshfix_cli.meshfile.vtk_arrays import Payload
 from meshfix_cli.meshfile.vtk_cells import Run, markings, runs
 from meshfix_cli.meshfile.vtk_xml import Element, XmlFile
+
+# What VTK and its readers call the numbers of points that are those of all pieces, where it is not declared.
+GLOBAL_IDS = ("GlobalPointIds", "GlobalNodeId", "GlobalNodeIds", "vtkGlobalPointIds", "vtkGlobalIds")
 
 
 def parse(data: bytes) -> Source:
@@ -32,19 +35,23 @@ def parse(data: bytes) -> Source:
     pieces = _pieces(file)
     shares = [_Share(piece.only("Points"), 3 * piece.before, 3 * piece.points) for piece in pieces if piece.points]
     kinds = {(share.array.kind, share.array.attributes.get("NumberOfComponents")) for share in shares}
-    if kinds not in ({("f4", "3")}, {("f8", "3")}):
+    if kinds not in (set(), {("f4", "3")}, {("f8", "3")}):
         raise ReadError("is not a readable vtu file: its points are not three Float32, or three Float64, each")
     cells = _cells(file, pieces)
     if any(file.shares(share.array) for share in (*shares, *cells.shares)):
         raise ReadError("has points or vertices that share their bytes with another array, which meshfix does not read")
-    points = np.concatenate([file.numbers(share.array, share.size).read() for share in shares]).reshape(-1, 3)
+    numbers = [file.numbers(share.array, share.size).read() for share in shares]
+    points = np.concatenate(numbers or [np.empty(0)]).reshape(-1, 3)
     found = runs(cells.types, cells.offsets, cells.connectivity)
     layout = _Layout(file, points.dtype, shares, cells.shares, [cells.offsets[run.rows] for run in found])
     load = cache(lambda: _arrays(file, pieces, found))
     labels = {array.name for piece in pieces for array in piece.arrays("CellData")}
     damaged = "is not a readable vtu file: its cell data {} are damaged, or not those of all pieces"
-    regions, held = markings(labels, lambda: load().cell, found, len(points), damaged)
-    return Source(points, [run.cells for run in found], layout, load, regions, held, _untold(file, pieces))
+    regions, marked = markings(labels, [run.cells for run in found], lambda: load().cell, damaged)
+    held = ghost_vertices(marked, len(points))
+    return Source(
+        points, marked, layout, load, regions, held, _untold(file, pieces), numbers=lambda: _global_ids(file, pieces)
+    )
 
 
 def promoted(data: bytes) -> bytes:
@@ -182,6 +189,19 @@ def _integers(file: XmlFile, array: Element, size: int) -> NDArray[np.int64]:
     if array.kind is None or array.kind[0] == "f":
         raise ReadError(f"is not a readable vtu file: its array {array.name!r} does not hold integers")
     return file.numbers(array, size).read().astype(np.int64, copy=False)
+
+
+def _global_ids(file: XmlFile, pieces: Sequence[_Piece]) -> NDArray[np.int64] | None:
+    """Return the array that the point data declare to hold the numbers of the points, or one of a name that does."""
+    found = []
+    for piece in (piece for piece in pieces if piece.points):
+        declared = [section.attributes.get("GlobalIds", "") for section in piece.element.named("PointData")]
+        arrays = {array.name: array for array in piece.arrays("PointData")}
+        names = [name for name in (*declared, *GLOBAL_IDS) if name in arrays]
+        if not names:
+            return None
+        found.append(_integers(file, arrays[names[0]], piece.points))
+    return np.concatenate(found) if found else None
 
 
 def _arrays(file: XmlFile, pieces: Sequence[_Piece], found: Sequence[Run]) -> Arrays:

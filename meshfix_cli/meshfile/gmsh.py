@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import ReadError
+from meshfix_cli.errors import ReadError, naming
 from meshfix_cli.meshfile.gmsh_cells import ORDER, TYPES
 from meshfix_cli.meshfile.gmsh_numbers import Int64
 from meshfix_cli.meshfile.gmsh_sections import Block, File, Numbers, UnknownError, read
@@ -29,13 +29,34 @@ def parse(data: bytes) -> Source | None:
         file = read(data)
     except UnknownError:
         return None
+    return _source(data, file, _labels([file])[0])
+
+
+def parse_parts(parts: Sequence[tuple[str, bytes]]) -> list[Source]:
+    """Read files that are the parts of one mesh: names and contents."""
+    files = []
+    for name, data in parts:
+        with naming(name):
+            try:
+                files.append(read(data))
+            except UnknownError as error:
+                raise ReadError("is of a kind that is not read: save it as 2.2 or 4.1") from error
+    sources = []
+    for (name, data), file, labels in zip(parts, files, _labels(files), strict=True):
+        with naming(name):
+            sources.append(_source(data, file, labels))
+    return sources
+
+
+def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
     for name, found in (("Nodes", file.tags), ("Elements", file.blocks)):
         if not found:
             raise ReadError(f"is not a readable gmsh file: there are no ${name} in it")
     tags, coordinates = np.concatenate(file.tags), _joined(file.coordinates)
     find = _finder(tags)
-    cells = [Cells(TYPES[block.kind][0], _vertices(block, find), block.ids) for block in file.blocks]
-    labels = _labels(file)
+    cells = [
+        Cells(TYPES[block.kind][0], _vertices(block, find), block.ids, file.ghosts(block)) for block in file.blocks
+    ]
     by_corner = "section $ElementNodeData" in file.untold
     layout = InPlace(data, coordinates, [_refuse if by_corner else block.corners for block in file.blocks])
     load, regions = partial(_load, file, tags, cells, labels), _regions(cells, labels)
@@ -43,7 +64,8 @@ def parse(data: bytes) -> Source | None:
         if not np.array_equal(numbers, np.arange(1, len(numbers) + 1)):
             file.untold[f"numbers of {what}"] = None
     notes = ("the parameters (u, v) of nodes on curves and faces stay as they are",) * file.parametric
-    return Source(coordinates.read(data), cells, layout, load, regions, untold=tuple(file.untold), notes=notes)
+    points = coordinates.read(data)
+    return Source(points, cells, layout, load, regions, None, tuple(file.untold), notes, numbers=lambda: tags)
 
 
 def _refuse() -> Places:
@@ -83,21 +105,29 @@ def _joined(places: Sequence[Places]) -> Places:
     return Places(begin, np.concatenate(ends) if ends else None, places[0].dtype)
 
 
-def _labels(file: File) -> dict[str, list[Int64]]:
-    """Entities and physical groups of the elements; where an entity is in several, also a number for each set."""
-    sets = [file.groups.get((block.dimension, int(block.entities[0])), ()) for block in file.blocks]
+def _labels(files: Sequence[File]) -> list[dict[str, list[Int64]]]:
+    """Entities and physical groups of the elements; where an entity is in several, also a number for each set.
+
+    What one file has, the others of a mesh have as well, with the same numbers.
+    """
+    blocks = [block for file in files for block in file.blocks]
+    sets = [file.groups.get(block.entity, ()) for file in files for block in file.blocks]
     physical = [
         np.full(len(block.ids), (*groups, 0)[0]) if block.physical is None else block.physical
-        for block, groups in zip(file.blocks, sets, strict=True)
+        for block, groups in zip(blocks, sets, strict=True)
     ]
-    labels = {_ENTITY: [block.entities for block in file.blocks]}
+    labels = {_ENTITY: [block.entities for block in blocks]}
     if any(values.any() for values in physical):
         labels[_PHYSICAL] = physical
     if any(len(groups) > 1 for groups in sets):
         known: dict[frozenset[int], int] = {frozenset(): 0}
         codes = [known.setdefault(frozenset(groups), len(known)) for groups in sets]
-        labels[_SETS] = [np.full(len(block.ids), code) for block, code in zip(file.blocks, codes, strict=True)]
-    return labels
+        labels[_SETS] = [np.full(len(block.ids), code) for block, code in zip(blocks, codes, strict=True)]
+    ends = np.cumsum([len(file.blocks) for file in files]).tolist()
+    return [
+        {name: values[end - len(file.blocks) : end] for name, values in labels.items()}
+        for file, end in zip(files, ends, strict=True)
+    ]
 
 
 def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:

@@ -43,6 +43,11 @@ class Block(NamedTuple):
     dimension: int
     corners: Callable[[], Places]
 
+    @property
+    def entity(self) -> tuple[int, int]:
+        """The dimension and the number of the entity that all elements belong to, in version 4.1."""
+        return self.dimension, int(self.entities[0])
+
 
 @dataclass
 class File:
@@ -56,6 +61,10 @@ class File:
     blocks : list of Block
     groups : dict
         The physical groups of each entity, which is a dimension and a number.
+    interfaces : set
+        Entities that lie between partitions of another of a higher dimension.
+    shadows : set of int
+        Numbers of the entities that hold ghost elements.
     names : dict
         Number and dimension of each group.
     views : list
@@ -70,10 +79,17 @@ class File:
     coordinates: list[Places] = field(default_factory=list)
     blocks: list[Block] = field(default_factory=list)
     groups: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
+    interfaces: set[tuple[int, int]] = field(default_factory=set)
+    shadows: set[int] = field(default_factory=set)
     names: dict[str, Any] = field(default_factory=dict)
     views: list[tuple[str, Numbers]] = field(default_factory=list)
     untold: dict[str, None] = field(default_factory=dict)
     parametric: bool = False
+
+    def ghosts(self, block: Block) -> NDArray[np.bool_] | None:
+        """Mark all elements (m,) of a block that belongs to another partition."""
+        here = block.dimension >= 0 and block.entity[1] in self.shadows and block.entity not in self.groups
+        return np.ones(len(block.ids), dtype=bool) if here else None
 
 
 def read(data: bytes) -> File:
@@ -113,11 +129,20 @@ def read(data: bytes) -> File:
         elif name in ("NodeData", "ElementData") and numbers is not None:
             file.views.append((name, replace(numbers, at=begin)))
         at += 1
+    _leave_out_interfaces(file)
     if numbers is None:
         raise ReadError(
             "is not a readable gmsh file: it has no $MeshFormat, as those of version 1; save it as 2.2 or 4.1"
         )
     return file
+
+
+def _leave_out_interfaces(file: File) -> None:
+    """Elements between partitions are none of the mesh: they would hold nodes that are inside of a volume."""
+    inner = [block for block in file.blocks if block.dimension < 0 or block.entity not in file.interfaces]
+    if len(inner) < len(file.blocks):
+        file.untold["elements between partitions"] = None
+        file.blocks = inner
 
 
 def _behind(data: bytes, at: int, name: str) -> int:
@@ -255,12 +280,13 @@ def _entities(numbers: Numbers, file: File, partitioned: bool) -> None:
     """Read the entities: tag, what it is a part of, box, physical groups, boundary."""
     if partitioned:
         numbers.sizes(1)
-        numbers.ints(2 * int(numbers.sizes(1)[0]))
+        file.shadows.update(numbers.ints(2 * int(numbers.sizes(1)[0]))[::2].tolist())
     for dimension, count in enumerate(numbers.sizes(4).tolist()):
         for _ in range(count):
             tag = int(numbers.ints(1)[0])
             if partitioned:
-                numbers.ints(2)
+                if numbers.ints(2)[0] > dimension:
+                    file.interfaces.add((dimension, tag))
                 numbers.ints(int(numbers.sizes(1)[0]))
             numbers.coordinates(1, 6 if dimension else 3)
             groups = numbers.ints(int(numbers.sizes(1)[0]))

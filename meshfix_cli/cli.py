@@ -164,6 +164,8 @@ def _open(files: Files, held: Held, show: _Show, *others: str | None) -> tuple[D
         _check_other(other, files.source, files.target, *named[:i])
     _check_input(files.source)
     document, output = files.open(held, show.threads)
+    for other in named:
+        _check_other(other, *document.files)
     if output.binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
@@ -419,7 +421,7 @@ def quality(
             _check_input(source)
             document = held.read(source, show.threads)
             if cells is not None:
-                _check_other(cells, source)
+                _check_other(cells, source, *document.files)
                 _write_cells(document, document.mesh, cells, show.threads)
             stages = {"mesh": document.mesh}
             report = show.judge(requirements).report("quality", document, stages, everything=everything)

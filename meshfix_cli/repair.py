@@ -61,12 +61,14 @@ class Files:
         ------
         ReadError, InvalidMeshError, WriteError
         """
-        from meshfix_cli.meshfile import check_target, output_format
+        from meshfix_cli.meshfile import check_pieces, check_target, output_format
 
         if not self.dry_run:
             check_target(self.target)
         document = held.read(self.source, threads, double=self.double, fix_orientation=self.fix_orientation)
         output = output_format(document, self.target, self.form)
+        if not self.dry_run:
+            check_pieces(document, self.target, output)
         if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
             lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
             raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")
@@ -83,7 +85,7 @@ class Files:
         stored, dropped = write(document, mesh, self.target, output, self.backup, put)
         if document.is_kept_by(output):
             return stored, ()
-        if document.source.layout is None:
+        if not document.source.spliced:
             return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
         lost = f"; dropped: {', '.join(dropped)}" if dropped else ""
         return stored, (f"converted from {document.format.name} to {output.name}{lost}",)

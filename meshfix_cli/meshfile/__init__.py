@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
@@ -15,19 +16,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli._kernels import use_threads
-from meshfix_cli.errors import MeshfixError, ReadError, WriteError
+from meshfix_cli.errors import MeshfixError, ReadError, WriteError, naming
 from meshfix_cli.mesh import CELL_NAMES, Mesh
 from meshfix_cli.meshfile import formats
-from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_text
-from meshfix_cli.meshfile.document import SIMPLEX, Document, build, counted, with_reversed
-from meshfix_cli.meshfile.formats import Format
-from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
+from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files, write_text
+from meshfix_cli.meshfile.document import Document, build, counted, with_reversed
+from meshfix_cli.meshfile.formats import PARTS, Format
+from meshfix_cli.meshfile.pieces import Family, join
+from meshfix_cli.meshfile.source import SIMPLEX, Arrays, Cells, Layout, Source
 from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing
 
 __all__ = [
     "Document",
     "Put",
     "check_cells",
+    "check_pieces",
     "check_target",
     "is_stream",
     "output_format",
@@ -56,7 +59,7 @@ def read(
     Parameters
     ----------
     path : str or path
-        "-" reads stdin.
+        "-" reads stdin; one that has a `*`, and is no file, reads the parts of a mesh whose names fit.
     fix : str, optional
         Name of a point-data array; vertices where it is not zero are held.
     regions : str, optional
@@ -77,24 +80,15 @@ def read(
     use_threads(threads)
     streamed = os.fspath(path) == "-"
     name = "<stdin>" if streamed else os.fspath(path)
-    try:
-        data = _read_bytes(None if streamed else Path(name))
-        form = formats.sniff(data) or formats.by_name(Path(name))
-        if form is None:
-            raise ReadError("the format is not recognised")
-        beside = None if streamed or not Path(name).is_file() else Path(name)  # a pipe can be read only once
-        source = _parse(data, form, beside)
-        if double and source.points.dtype != np.float64:
-            source = _promoted(data, form)
+    with naming(name):
+        source, form = _open(None if streamed else Path(name), double, threads)
         document = build(name, source, form, fix, regions, threads)
         rows = document.reversed_cells() if fix_orientation else {}
         if rows:
             note = f"renumbered {counted(sum(map(len, rows.values())), *CELL_NAMES[document.mesh.dimension])}"
-            document = build(name, _with_reversed(document.source, rows, form), form, fix, regions, threads)
+            document = build(name, _with_reversed(document.source, rows, form, threads), form, fix, regions, threads)
             document = replace(document, notes=(*document.notes, note))
         return document
-    except MeshfixError as error:
-        raise type(error)(f"{name}: {error}") from error
 
 
 def write(
@@ -116,7 +110,8 @@ def write(
     mesh : Mesh
         Made of `document.mesh` by moving vertices.
     target : str or path
-        Replaced at once or not at all; "-" writes to stdout.
+        Replaced at once or not at all; "-" writes to stdout. Of a mesh in pieces it is what was read, or its like:
+        the name of a .pvtu, or one with a `*`.
     form : Format, optional
         Default: see `output_format`.
     backup : bool
@@ -132,9 +127,13 @@ def write(
     target = os.fspath(target)
     form = form or output_format(document, target)
     check_target(target)
+    check_pieces(document, target, form)
     points, source = document.file_points(mesh), document.source
     stored = document.in_plane(points.astype(np.float64), mesh)
-    layout = source.layout if form == document.format else None
+    layout, pieces = (source.layout, source.pieces) if form == document.format else (None, None)
+    if pieces is not None:
+        write_files(pieces.files(target, source.points, points), backup)
+        return stored, ()
     if layout is not None:
         write_file(target, partial(_splice, layout, source.points, points, put), backup)
         return stored, ()
@@ -203,24 +202,38 @@ def check_cells(document: Document, target: str) -> Format:
     return form
 
 
+def check_pieces(document: Document, target: str, form: Format) -> None:
+    """Raise WriteError now, before any work, where the pieces of a mesh cannot be written for this target."""
+    if document.source.pieces is not None:
+        document.source.pieces.check(target, form == document.format)
+
+
 def output_format(document: Document, target: str, name: str | None = None) -> Format:
     """Return the format of the output: the one named, else that of the target's extension, else the input's.
 
-    A target that is the input keeps its format, and one with an extension that is not known has it.
+    A target that is the input keeps its format, and one with an extension that is not known has it. A mesh that was
+    read in parts is written so where its format stays.
 
     Raises
     ------
     WriteError
         The format cannot be written.
     """
+    in_parts = document.format == PARTS
+    if "*" in Path(target).name and not Path(target).exists():
+        if not in_parts or name is not None:
+            raise WriteError(f"{target}: a * in OUTPUT is for a mesh in parts, which are read by a * in INPUT")
+        return document.format
     if name is not None:
         form = Format(name)
     elif target == "-" or document.is_file(target):
         form = document.format
     else:
         form = formats.by_name(Path(target)) or document.format
+        if in_parts and form.reader == "gmsh":
+            return document.format
     if form.reader == document.format.reader and name is None:
-        return document.format if document.source.layout is not None else _writable(document.format, target)
+        return document.format if document.source.spliced else _writable(document.format, target)
     if form.binary is None and form.name in formats.BOTH:
         form = Format(form.name, bool(document.format.binary))
     return document.format if form == document.format else _writable(form, target)
@@ -232,6 +245,40 @@ def _writable(form: Format, target: str) -> Format:
     if form.name not in formats.writers():
         raise WriteError(f"{target}: the format {form.name} cannot be written")
     return form
+
+
+def _open(path: Path | None, double: bool, threads: int) -> tuple[Source, Format]:
+    """Read what a file holds, or stdin, or several files, and in which format."""
+    if path is not None and "*" in str(path) and not path.exists():
+        from meshfix_cli.meshfile.parts import Parts
+
+        return _open_pieces(Parts.of(str(path)), double, threads)
+    data = _read_bytes(path)
+    form = formats.sniff(data) or formats.by_name(Path() if path is None else path)
+    if form is None:
+        raise ReadError("the format is not recognised")
+    beside = path if path is not None and path.is_file() else None  # a pipe can be read only once
+    if form.name == "pvtu":
+        from meshfix_cli.meshfile.pvtu import Index
+
+        return _open_pieces(Index.of(data, beside), double, threads)
+    source = _parse(data, form, beside)
+    if double and source.points.dtype != np.float64:
+        source = _promoted(data, form)
+    return source, form
+
+
+def _open_pieces(family: Family, double: bool, threads: int) -> tuple[Source, Format]:
+    contents = []
+    for name, path in zip(family.names, family.paths, strict=True):
+        with naming(name):
+            contents.append(_read_bytes(path))
+    with _believable(family.form):
+        source = join(family, family.parse(contents), threads)
+        if double and source.points.dtype != np.float64:
+            family, contents = family.promoted(contents)
+            source = join(family, family.parse(contents), threads)
+    return source, family.form
 
 
 def _read_bytes(path: Path | None) -> bytes:
@@ -249,15 +296,21 @@ def _parse(data: bytes, form: Format, path: Path | None = None) -> Source:
     """Let the format's own module read; what it does not know, meshio reads, which may look for files beside it."""
     source = None
     if form.reader in formats.OWN:
-        try:
+        with _believable(form):
             source = _module(form).parse(data)
-        except (OverflowError, MemoryError) as error:  # a count that no file can keep
-            raise ReadError(f"is not a readable {form.name} file: it announces more than it holds") from error
     if source is None:
         from meshfix_cli.meshfile import through_meshio
 
         source = through_meshio.read(data, form, path)
     return source
+
+
+@contextmanager
+def _believable(form: Format) -> Iterator[None]:
+    try:
+        yield
+    except (OverflowError, MemoryError) as error:  # a count that no file can keep
+        raise ReadError(f"is not a readable {form.name} file: it announces more than it holds") from error
 
 
 def _module(form: Format) -> Any:
@@ -272,10 +325,13 @@ def _promoted(data: bytes, form: Format) -> Source:
     return _parse(_module(form).promoted(data), form)
 
 
-def _with_reversed(source: Source, rows: dict[int, NDArray[np.int64]], form: Format) -> Source:
-    if source.layout is None:
-        return with_reversed(source, rows)
-    return _parse(source.layout.rewritten(source.points, source.points, rows), form)
+def _with_reversed(source: Source, rows: dict[int, NDArray[np.int64]], form: Format, threads: int) -> Source:
+    if source.pieces is not None:
+        family = source.pieces.family
+        return join(family, family.parse(list(source.pieces.rewritten(source.points, source.points, rows))), threads)
+    if source.layout is not None:
+        return _parse(source.layout.rewritten(source.points, source.points, rows), form)
+    return with_reversed(source, rows)
 
 
 def _write_anew(

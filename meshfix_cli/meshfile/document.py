@@ -15,9 +15,7 @@ from meshfix_cli.errors import InvalidMeshError, ReadError
 from meshfix_cli.mesh import CELL_NAMES, LARGEST_COORDINATE, Mesh, Topology
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
-from meshfix_cli.meshfile.source import Cells, Source
-
-SIMPLEX = {2: "triangle", 3: "tetra"}
+from meshfix_cli.meshfile.source import SIMPLEX, Cells, Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +48,12 @@ class Document:
     notes: tuple[str, ...]
     source: Source = field(repr=False)
     basis: NDArray[np.float64] | None
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The names of the files that hold the mesh."""
+        pieces = self.source.pieces
+        return (self.name, *(map(str, pieces.family.paths) if pieces else ()))
 
     @property
     def simplices(self) -> NDArray[np.int64]:
@@ -102,7 +106,7 @@ class Document:
 
     def is_kept_by(self, form: Format) -> bool:
         """Whether writing in a format keeps all but the coordinates, byte for byte."""
-        return form == self.format and self.source.layout is not None
+        return form == self.format and self.source.spliced
 
     def reversed_cells(self) -> dict[int, NDArray[np.int64]]:
         """Rows of the simplices, by the number of their run, whose numbering has the negative orientation."""

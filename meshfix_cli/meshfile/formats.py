@@ -16,6 +16,7 @@ _EXTENSIONS = {f".{name}": name for name in ("obj", "ply", "stl", "vtk", "vtu")}
     ".inp": "abaqus",
     ".mesh": "medit",
     ".msh": "gmsh22",
+    ".pvtu": "pvtu",
 }
 ENDLESS = ("tecplot", "wkt")  # meshio reads truncated files of these for ever
 BOTH = ("gmsh", "gmsh22", "ply", "stl", "vtk", "vtk42", "vtu")  # written as text or binary
@@ -34,6 +35,9 @@ class Format:
         return {"gmsh22": "gmsh", "vtk42": "vtk"}.get(self.name, self.name)
 
 
+PARTS = Format("gmsh parts")  # several files of gmsh
+
+
 def sniff(data: bytes) -> Format | None:
     """Recognise a format by the first bytes of a file; None: unknown."""
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
@@ -49,6 +53,8 @@ def sniff(data: bytes) -> Format | None:
         fields = text.split("$MeshFormat", 1)[1].split()
         return Format("gmsh22" if fields[:1] and fields[0].startswith("2") else "gmsh", fields[1:2] == ["1"])
     if text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin")):
+        if re.search(r"<VTKFile[^>]*\stype\s*=\s*[\"']PUnstructuredGrid", text):
+            return Format("pvtu")
         if re.search(r"<VTKFile[^>]*\stype\s*=\s*[\"']UnstructuredGrid", text):
             return Format("vtu", re.search(r"format\s*=\s*[\"']ascii", text) is None)
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None

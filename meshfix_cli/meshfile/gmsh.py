@@ -29,11 +29,16 @@ def parse(data: bytes) -> Source | None:
         file = read(data)
     except UnknownError:
         return None
+    if not file.blocks:
+        raise ReadError("is not a readable gmsh file: there are no $Elements in it")
     return _source(data, file, _labels([file])[0])
 
 
 def parse_parts(parts: Sequence[tuple[str, bytes]]) -> list[Source]:
-    """Read files that are the parts of one mesh: names and contents."""
+    """Read files that are the parts of one mesh: names and contents.
+
+    gmsh leaves elements out that are in no group, where others are; so a part may have none.
+    """
     files = []
     for name, data in parts:
         with naming(name):
@@ -44,14 +49,15 @@ def parse_parts(parts: Sequence[tuple[str, bytes]]) -> list[Source]:
     sources = []
     for (name, data), file, labels in zip(parts, files, _labels(files), strict=True):
         with naming(name):
-            sources.append(_source(data, file, labels))
+            source = _source(data, file, labels)
+        lacking = () if source.cells else (f"there are no elements in {name}",)
+        sources.append(replace(source, notes=(*source.notes, *lacking)))
     return sources
 
 
 def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
-    for name, found in (("Nodes", file.tags), ("Elements", file.blocks)):
-        if not found:
-            raise ReadError(f"is not a readable gmsh file: there are no ${name} in it")
+    if not file.tags:
+        raise ReadError("is not a readable gmsh file: there are no $Nodes in it")
     tags, coordinates = np.concatenate(file.tags), _joined(file.coordinates)
     find = _finder(tags)
     cells = [
@@ -60,7 +66,7 @@ def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
     by_corner = "section $ElementNodeData" in file.untold
     layout = InPlace(data, coordinates, [_refuse if by_corner else block.corners for block in file.blocks])
     load, regions = partial(_load, file, tags, cells, labels), _regions(cells, labels)
-    for what, numbers in (("nodes", tags), ("elements", np.concatenate([block.ids for block in file.blocks]))):
+    for what, numbers in (("nodes", tags), ("elements", _ids(cells))):
         if not np.array_equal(numbers, np.arange(1, len(numbers) + 1)):
             file.untold[f"numbers of {what}"] = None
     notes = ("the parameters (u, v) of nodes on curves and faces stay as they are",) * file.parametric
@@ -130,6 +136,10 @@ def _labels(files: Sequence[File]) -> list[dict[str, list[Int64]]]:
     ]
 
 
+def _ids(cells: Sequence[Cells]) -> Int64:
+    return np.concatenate([np.empty(0, dtype=np.int64), *(run.ids for run in cells if run.ids is not None)])
+
+
 def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
     """The array of groups, if a simplex is in one."""
     name = _SETS if _SETS in labels else _PHYSICAL
@@ -144,7 +154,7 @@ def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, 
     point: dict[str, Any] = {}
     cell: dict[str, Any] = dict(labels)
     ends = np.cumsum([len(run.vertices) for run in cells])
-    ids = np.concatenate([run.ids for run in cells if run.ids is not None])
+    ids = _ids(cells)
     for section, numbers in file.views:
         arrays, wanted = (point, tags) if section == "NodeData" else (cell, ids)
         try:

@@ -306,9 +306,10 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
 def main() -> None:
     """Repair tangled triangle and tetrahedral meshes by moving interior vertices.
 
-    INPUT and OUTPUT are files, or - for stdin and stdout. Exit codes: 0 the mesh is valid, 1 an error (nothing
-    was written), 2 wrong usage, 3 inverted elements remain, the fixed boundary crosses itself or a --require is not
-    met, 4 some of several meshes cannot be read.
+    INPUT and OUTPUT are files, or - for stdin and stdout; a .pvtu stands for its pieces, and 'mesh_*.msh', in quotes,
+    for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (nothing was written), 2 wrong usage,
+    3 inverted elements remain, the fixed boundary crosses itself or a --require is not met, 4 some of several meshes
+    cannot be read.
     """
 
 

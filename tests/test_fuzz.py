@@ -14,8 +14,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from files_pvtu import slabs, split
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from shapes import plate
 from test_splice import FORMATS, MODULES
 
 from meshfix_cli import _kernels, read, untangle, write
@@ -114,3 +116,34 @@ def check(path: Path, data: bytes) -> None:
     assert again.mesh.topology.misnumbered.sum() == document.mesh.topology.misnumbered.sum()
     fixed = ~document.mesh.movable & document.mesh.topology.used
     assert again.source.points[fixed].tobytes() == document.source.points[fixed].tobytes()
+
+
+@cache
+def pieces_of_a_mesh() -> dict[str, bytes]:
+    points, cells = plate()
+    with tempfile.TemporaryDirectory() as folder:
+        split(Path(folder) / "in.pvtu", points, cells, slabs(points, cells, 2), mode="Ascii", ids=True, ghosts=True)
+        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+@st.composite
+def broken_pieces(draw: st.DrawFn) -> dict[str, bytes]:
+    files = pieces_of_a_mesh()
+    name = draw(st.sampled_from(["in.pvtu", "in.pvtu", "in_1.vtu"]))
+    return {**files, name: mutated(draw, files[name])}
+
+
+@settings(max_examples=EXAMPLES or 60, derandomize=not EXAMPLES, deadline=None, database=None)
+@given(broken_pieces())
+def test_broken_pieces(files: dict[str, bytes]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, data in files.items():
+            (Path(folder) / name).write_bytes(data)
+        try:
+            document = read(Path(folder) / "in.pvtu")
+            result, _ = write(document, untangle(document.mesh, sweeps=2, smooth=1).after, Path(folder) / "out.pvtu")
+        except MeshfixError as error:
+            assert "\n" not in str(error)
+            assert {path.name for path in Path(folder).iterdir()} == files.keys()
+            return
+        assert read(Path(folder) / "out.pvtu").mesh.check() == result.check()

@@ -180,3 +180,21 @@ def test_parts_become_one_file_of_another_format(tmp_path: Path) -> None:
     run("untangle", "-q", "--format", "gmsh22", pattern, tmp_path / "out.msh")
     for name in ("out.vtk", "out.msh"):
         assert read(tmp_path / name).mesh.topology.m == read(whole).mesh.topology.m
+
+
+def test_partitions_are_no_materials_in_one_file_either(tmp_path: Path) -> None:
+    """Where there are no groups, gmsh saves the triangles between partitions as well."""
+    with gmsh_session(MshFileVersion=4.1, Binary=0) as gmsh:
+        periodic_box(gmsh)
+        gmsh.write(str(tmp_path / "whole.msh"))
+        gmsh.model.mesh.partition(3)
+        gmsh.write(str(tmp_path / "cut.msh"))
+    cut, whole = read(tmp_path / "cut.msh"), read(tmp_path / "whole.msh")
+    assert cut.mesh.movable.sum() == whole.mesh.movable.sum()
+    assert "elements between partitions" in cut.source.untold
+
+
+def test_a_part_that_is_missing_is_told(tmp_path: Path) -> None:
+    pattern, _ = by_gmsh(tmp_path, "boxes", 4.1, 0)
+    (tmp_path / "in_2.msh").unlink()
+    assert "there are 2 files, and 3 partitions of the mesh" in read(pattern).notes

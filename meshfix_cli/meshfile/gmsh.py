@@ -52,6 +52,10 @@ def parse_parts(parts: Sequence[tuple[str, bytes]]) -> list[Source]:
             source = _source(data, file, labels)
         lacking = () if source.cells else (f"there are no elements in {name}",)
         sources.append(replace(source, notes=(*source.notes, *lacking)))
+    partitions = max(file.partitions for file in files)
+    if partitions > len(files):
+        note = f"there are {len(files)} files, and {partitions} partitions of the mesh"
+        sources[0] = replace(sources[0], notes=(*sources[0].notes, note))
     return sources
 
 

@@ -65,6 +65,8 @@ class File:
         Entities that lie between partitions of another of a higher dimension.
     shadows : set of int
         Numbers of the entities that hold ghost elements.
+    partitions : int
+        Into how many the mesh is cut.
     names : dict
         Number and dimension of each group.
     views : list
@@ -81,6 +83,7 @@ class File:
     groups: dict[tuple[int, int], tuple[int, ...]] = field(default_factory=dict)
     interfaces: set[tuple[int, int]] = field(default_factory=set)
     shadows: set[int] = field(default_factory=set)
+    partitions: int = 0
     names: dict[str, Any] = field(default_factory=dict)
     views: list[tuple[str, Numbers]] = field(default_factory=list)
     untold: dict[str, None] = field(default_factory=dict)
@@ -279,7 +282,7 @@ def _nodes_of(kind: int) -> int:
 def _entities(numbers: Numbers, file: File, partitioned: bool) -> None:
     """Read the entities: tag, what it is a part of, box, physical groups, boundary."""
     if partitioned:
-        numbers.sizes(1)
+        file.partitions = int(numbers.sizes(1)[0])
         file.shadows.update(numbers.ints(2 * int(numbers.sizes(1)[0]))[::2].tolist())
     for dimension, count in enumerate(numbers.sizes(4).tolist()):
         for _ in range(count):

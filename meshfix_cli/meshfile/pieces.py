@@ -19,31 +19,27 @@ from meshfix_cli.meshfile.splice import Points, differing
 
 
 class Family(Protocol):
-    """The files of one mesh, and what they are called.
-
-    Attributes
-    ----------
-    form : Format
-    names : sequence of str
-        Of the pieces, as a user knows them.
-    paths : sequence of Path
-        Of the pieces.
-    numbers : str
-        What the numbers are called by which points are joined.
-    by_position : bool
-        Whether cells are named by their position among those of all pieces; else they have numbers of their own.
-    """
+    """The files of one mesh, and what they are called."""
 
     @property
-    def form(self) -> Format: ...  # noqa: D102
+    def form(self) -> Format:
+        """The format of all of them together."""
+
     @property
-    def names(self) -> Sequence[str]: ...  # noqa: D102
+    def names(self) -> Sequence[str]:
+        """The pieces, as a user knows them."""
+
     @property
-    def paths(self) -> Sequence[Path]: ...  # noqa: D102
+    def paths(self) -> Sequence[Path]:
+        """Where the pieces are."""
+
     @property
-    def numbers(self) -> str: ...  # noqa: D102
+    def numbers(self) -> str:
+        """What the numbers are called by which points are joined."""
+
     @property
-    def by_position(self) -> bool: ...  # noqa: D102
+    def by_position(self) -> bool:
+        """Whether cells are named by their position among those of all pieces; else they have numbers of their own."""
 
     def parse(self, contents: Sequence[bytes]) -> list[Source]:
         """Read the pieces."""

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from files_vtu import read_independently as read_piece
 from numpy.typing import NDArray
 from shapes import block, plate
 from test_cli import error_line, run
-from test_faults import POSIX, start
+from test_faults import POSIX, SLOW_DISK, WRITES_FOR_EVER, start
 from test_splice import WORD, without_points
 
 from meshfix_cli import read, untangle, write
@@ -170,7 +171,8 @@ def test_empty_pieces_are_pieces(tmp_path: Path) -> None:
         assert (tmp_path / f"out_{i}.vtu").read_bytes() == (tmp_path / f"in_{i}.vtu").read_bytes()
     read_independently(target)
     index(path, ["in_0.vtu"])
-    assert "there are no tetrahedra" in error_line("quality", path)
+    with pytest.raises(ReadError, match="there are no tetrahedra"):
+        read(path)
 
 
 def test_elements_are_named_by_their_position_among_those_of_all_pieces(tmp_path: Path) -> None:
@@ -216,9 +218,8 @@ def test_a_slit_that_reaches_an_interface_needs_global_ids(right_in_two: bool, t
     points, cells = slit()
     right, upper = quadrants(cells, points, 2)
     piece = right.astype(int) + (right & upper & right_in_two)
-    complaint = error_line("quality", split(tmp_path / "in.pvtu", points, cells, piece))
-    assert "in_0.vtu has 2 points at (2, 2, 0), where in_1.vtu has" in complaint
-    assert "global ids" in complaint
+    with pytest.raises(ReadError, match=r"in_0.vtu has 2 points at \(2, 2, 0\), where in_1.vtu has .* global ids"):
+        read(split(tmp_path / "in.pvtu", points, cells, piece))
     document = read(split(tmp_path / "in.pvtu", points, cells, piece, ids=True))
     assert document.mesh.topology.n == len(points)
     assert not document.mesh.movable[(document.source.points == [2, 2, 0]).all(axis=1)].any()
@@ -239,7 +240,7 @@ def test_points_inside_of_pieces_are_never_joined(tmp_path: Path) -> None:
 
 
 def broken(folder: Path, what: str) -> Path:
-    path = made(folder, mode="Ascii", ids=what in ("twice", "some ids", "apart"))
+    path = made(folder, mode="Ascii", ids=what in ("twice", "some ids", "apart", "ids that are no integers"))
     piece = folder / "in_1.vtu"
     text = piece.read_text()
     if what == "missing":
@@ -259,6 +260,8 @@ def broken(folder: Path, what: str) -> Path:
         save(piece, grid(points.astype("f4"), cells, {}, {}))
     elif what == "some ids":
         piece.write_text(text.replace(' GlobalIds="ids"', "").replace('"ids"', '"numbers"'))
+    elif what == "ids that are no integers":
+        piece.write_text(re.sub(r'type="\w+"( IdType="1")? Name="ids"', 'type="Float64" Name="ids"', text))
     elif what == "twice":
         piece.write_text(re.sub(r'(Name="ids"[^>]*>\s*)(\d+) \d+', r"\1\2 \2", text))
     elif what == "apart":
@@ -275,6 +278,7 @@ def broken(folder: Path, what: str) -> Path:
     ("what", "said"),
     [
         ("missing", "in.pvtu: in_1.vtu: No such file or directory"),
+        ("ids that are no integers", "in_1.vtu: is not a readable vtu file: its array 'ids' does not hold integers"),
         ("nothing in it", "in_1.vtu: is empty"),
         ("truncated", "in_1.vtu: is truncated: it does not end with </VTKFile>"),
         ("of another type", "in_1.vtu: is a piece, and not a .vtu file of an unstructured grid"),
@@ -290,9 +294,10 @@ def broken(folder: Path, what: str) -> Path:
 )
 def test_what_is_wrong_with_a_piece_is_one_line_that_names_it(what: str, said: str, tmp_path: Path) -> None:
     path = broken(tmp_path, what)
-    before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
-    assert said in error_line("untangle", path, path)
-    assert {one.name: one.read_bytes() for one in tmp_path.iterdir()} == before
+    with pytest.raises(ReadError) as caught:
+        read(path)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
 
 
 def test_neither_stdin_nor_stdout_has_room_for_pieces(tmp_path: Path) -> None:
@@ -393,13 +398,13 @@ def test_arrays_of_the_pieces_hold_points_and_interfaces(tmp_path: Path) -> None
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="limits of POSIX")
-@pytest.mark.parametrize("share", [0.0, 0.4, 0.9, 0.99])
+@pytest.mark.parametrize("share", [0.0, 0.9])
 def test_a_full_disk_changes_no_piece(share: float, tmp_path: Path) -> None:
     import resource
 
     points, cells = block()
     piece = np.maximum(slabs(points, cells, 8) - 5, 0)  # the first is the largest
-    path = split(tmp_path / "in.pvtu", points, cells, piece[::1], mode="Ascii")
+    path = split(tmp_path / "in.pvtu", points, cells, piece, mode="Ascii")
     before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
     limit = int(share * max(map(len, before.values())))
     for target in (path, tmp_path / "out.pvtu"):
@@ -431,6 +436,22 @@ main(sys.argv[1:])
 
 
 @POSIX
+def test_killed_while_it_writes_each_file_is_the_old_or_the_new(tmp_path: Path, random: np.random.Generator) -> None:
+    path = made(tmp_path)
+    repaired(path, tmp_path / "out.pvtu")
+    tangled = {one: one.read_bytes() for one in pieces(path)}
+    both = zip(tangled.items(), pieces(tmp_path / "out.pvtu"), strict=True)
+    versions = {one: {data, new.read_bytes()} for (one, data), new in both}
+    for _ in range(3):
+        for one, data in tangled.items():
+            one.write_bytes(data)
+        with start(WRITES_FOR_EVER, path) as child:
+            time.sleep(random.uniform(0, 0.05))
+            child.kill()
+        assert all(one.read_bytes() in found for one, found in versions.items())
+
+
+@POSIX
 def test_a_signal_between_two_files_leaves_no_mixture(tmp_path: Path) -> None:
     path = made(tmp_path)
     run("untangle", "-q", path, tmp_path / "out.pvtu")
@@ -447,8 +468,6 @@ def test_a_signal_between_two_files_leaves_no_mixture(tmp_path: Path) -> None:
 def test_a_signal_before_the_first_file_is_replaced_changes_none(tmp_path: Path) -> None:
     path = made(tmp_path)
     before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
-    from test_faults import SLOW_DISK
-
     with start(SLOW_DISK, "untangle", "-q", path, path) as child:
         child.send_signal(signal.SIGTERM)
         child.communicate(timeout=30)

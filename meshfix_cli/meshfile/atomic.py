@@ -68,7 +68,7 @@ def write_files(contents: Iterable[tuple[str, bytes]], backup: bool = False) -> 
                 _keep(path)
         try:
             _replace_all(ready)
-        except SystemExit:  # a signal between two of them: the rest takes no time, and a mixture is no mesh
+        except (SystemExit, KeyboardInterrupt):  # between two of them: the rest takes no time, and a mixture is no mesh
             _replace_all(ready)
             raise
 

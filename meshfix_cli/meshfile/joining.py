@@ -161,10 +161,8 @@ def _groups(points: Points) -> Int64:
 
 def _ambiguous(copies: Copies, rows: Int64) -> ReadError:
     pieces, counts = np.unique(copies.piece[rows], return_counts=True)
-    crowded = copies.names[pieces[np.argmax(counts)]]
-    other = copies.names[pieces[np.argmax(pieces != pieces[np.argmax(counts)])]]
+    crowded, other = (copies.names[pieces[i]] for i in np.argsort(-counts, kind="stable")[:2])
     return ReadError(
-        f"{crowded} has {counts.max()} points at {copies.place(rows[0])}, where {other} has "
-        f"{'one' if counts[pieces != pieces[np.argmax(counts)]][0] == 1 else 'several'} as well: "
+        f"{crowded} has {counts.max()} points at {copies.place(rows[0])}, where {other} has some as well: "
         "only global ids could tell which of them are the same"
     )

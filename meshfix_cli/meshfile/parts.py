@@ -106,6 +106,7 @@ class Parts:
         return [pattern.with_name(before + text + after) for text in self.texts]
 
 
-def _in_order(text: str) -> list[tuple[int, str]]:
+def _in_order(text: str) -> tuple[list[tuple[int, str]], str]:
     """Order 2 before 10."""
-    return [(int(word), "") if word.isdecimal() else (-1, word) for word in re.split(r"(\d+)", text)]
+    words = re.split(r"(\d+)", text)
+    return [(int(word), "") if word.isdecimal() else (-1, word) for word in words], text

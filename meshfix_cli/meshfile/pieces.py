@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import ReadError, WriteError
+from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.atomic import check_target, is_stream
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.joining import Copies, Int64, by_numbers, by_place, joined
@@ -194,8 +194,10 @@ def _all_cells(family: Family, sources: Sequence[Source], starts: Int64) -> list
 
 def _numbers(family: Family, sources: Sequence[Source]) -> Int64 | None:
     """The numbers of the points of all pieces, if they have some."""
-    filled = _filled(sources)
-    found = [source.numbers() for source in filled]
+    filled, found = _filled(sources), []
+    for source in filled:
+        with naming(family.names[sources.index(source)]):
+            found.append(source.numbers())
     present = [numbers for numbers in found if numbers is not None]
     if not present:
         return None

@@ -30,6 +30,7 @@ ALLOWED = {
     "distributed": {"_kernels", "errors", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},
     "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "team", "untangle"},
     "cli": {
+        "_kernels",
         "distributed",
         "errors",
         "mesh",

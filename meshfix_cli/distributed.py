@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,23 +199,30 @@ def parts(mesh: Mesh, ranks: int, reach: float, threads: int) -> Iterator[Part]:
     colour[stars.colour_blocks] = np.repeat(
         np.arange(len(stars.colour_offsets) - 1, dtype=np.int32), np.diff(stars.colour_offsets)
     )
-    corners = mesh.dimension + 1
     owner, number = np.repeat(of_block, _kernels.BLOCK_SIZE)[: len(points)], np.empty(len(points), dtype=np.int32)
     for rank in range(ranks):
-        own = np.flatnonzero(owner == rank).astype(np.int32)
-        rows = np.flatnonzero((owner[stars.simplices] == rank).any(axis=1))
+        blocks = np.flatnonzero(of_block == rank)
+        own, rows = _stars_of(stars, blocks)
         simplices = stars.simplices[rows]
-        there = np.zeros(len(points), dtype=bool)
-        there[simplices] = True
-        there[own] = False
-        ghosts = np.flatnonzero(there).astype(np.int32)
+        vertices = np.unique(simplices)
+        ghosts = vertices[owner[vertices] != rank]
         vertices = np.concatenate([own, ghosts])
         number[vertices] = np.arange(len(vertices), dtype=np.int32)
         yield Part(
-            vertices, len(own), points[vertices], movable[vertices], number[simplices].reshape(-1, corners),
-            owner[simplices[:, 0]] == rank, owner[ghosts], colour[ghosts // _kernels.BLOCK_SIZE],
-            colour[of_block == rank], reach,
+            vertices, len(own), points[vertices], movable[vertices], number[simplices], owner[simplices[:, 0]] == rank,
+            owner[ghosts], colour[ghosts // _kernels.BLOCK_SIZE], colour[blocks], reach,
         )  # fmt: skip
+
+
+def _stars_of(stars: _kernels.Connectivity, blocks: NDArray[np.intp]) -> tuple[Numbers, Numbers]:
+    """Return the vertices of some blocks and the simplices of their stars, both ascending."""
+    begins = blocks * _kernels.BLOCK_SIZE
+    ends = np.minimum(begins + _kernels.BLOCK_SIZE, len(stars.vertices))
+    ranges = list(zip(begins.tolist(), ends.tolist(), strict=True))
+    own = [np.arange(begin, end, dtype=np.int32) for begin, end in ranges]
+    corners = [stars.corners[stars.offsets[begin] : stars.offsets[end]] for begin, end in ranges]
+    none = [np.empty(0, dtype=np.int32)]
+    return np.concatenate(own or none), np.unique(np.concatenate(corners or none) // stars.simplices.shape[1])
 
 
 def partition(stars: _kernels.Connectivity, ranks: int) -> Numbers:
@@ -245,6 +252,21 @@ class _Halo:
     received: dict[int, Numbers]
     interface: Numbers  # blocks with a vertex that is sent
     inner: Numbers
+
+
+class _Travelling(NamedTuple):
+    """Rows of values on their way, with the vertices that those to come belong to."""
+
+    arriving: list[tuple[Numbers, NDArray[Any], Request]]
+    leaving: list[tuple[NDArray[Any], Request]]
+
+    def received(self) -> Iterator[tuple[Numbers, NDArray[Any]]]:
+        """Wait for them, and for those that leave."""
+        for vertices, buffer, request in self.arriving:
+            request.Wait()
+            yield vertices, buffer
+        for _, request in self.leaving:
+            request.Wait()
 
 
 class Ranks:
@@ -293,7 +315,7 @@ class Ranks:
         """Return a mask (n,) with what the owners of the ghosts say of them."""
         result = mask.copy()
         for halo in self.halos:
-            for vertices, values in self._received(halo, self._send(halo, mask.view(np.uint8)[:, None])):
+            for vertices, values in self._send(halo, mask.view(np.uint8)[:, None]).received():
                 result[vertices] = values[:, 0] != 0
         return result
 
@@ -303,7 +325,7 @@ class Ranks:
             yield halo.interface
             travelling = self._send(halo, points)
             yield halo.inner
-            for vertices, positions in self._received(halo, travelling):
+            for vertices, positions in travelling.received():
                 _kernels.receive(points, states, self.stars, vertices, positions)
 
     def of_whole(self, compute: Callable[..., Iterator[Array]], *values: NDArray[Any]) -> Iterator[Array]:
@@ -362,28 +384,18 @@ class Ranks:
             )
         return halos
 
-    def _send(self, halo: _Halo, values: NDArray[Any]) -> list[tuple[Numbers, NDArray[Any], Request]]:
-        """Start the exchange of rows of values; return what is to come."""
-        arriving = []
+    def _send(self, halo: _Halo, values: NDArray[Any]) -> _Travelling:
+        """Start the exchange of rows of values."""
+        arriving, leaving = [], []
         for rank, vertices in halo.received.items():
             buffer = np.empty((len(vertices), values.shape[1]), dtype=values.dtype)
             arriving.append((vertices, buffer, self.comm.Irecv(buffer, rank)))
-        self.leaving = []
         for rank, vertices in halo.sent.items():
             buffer = values[vertices]
-            self.leaving.append((buffer, self.comm.Isend(buffer, rank)))
+            leaving.append((buffer, self.comm.Isend(buffer, rank)))
             self.messages += 1
             self.bytes += buffer.nbytes
-        return arriving
-
-    def _received(
-        self, halo: _Halo, arriving: list[tuple[Numbers, NDArray[Any], Request]]
-    ) -> Iterator[tuple[Numbers, NDArray[Any]]]:
-        for vertices, buffer, request in arriving:
-            request.Wait()
-            yield vertices, buffer
-        for _, request in self.leaving:
-            request.Wait()
+        return _Travelling(arriving, leaving)
 
 
 def _without_empty(lists: dict[int, Numbers]) -> dict[int, Numbers]:

@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
-.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables samples clean
+.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables man samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -70,6 +70,11 @@ compare: $(VENV)/developer ## beside gmsh's UntangleMeshGeometry; MESH=FILE or T
 
 tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)
+
+RELEASED := 2026-11-26
+man: $(VENV)/developer ## make the manual pages in man/ of the help
+	rm -rf man && mkdir man
+	$(BIN)/click-man --target man --man-date $(RELEASED) meshfix >/dev/null
 
 samples: $(VENV)/developer ## make the sample meshes again
 	$(BIN)/python sample_meshes/generate.py

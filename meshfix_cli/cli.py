@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import time
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, fields, replace
 from functools import partial, wraps
 from pathlib import Path
@@ -23,8 +24,11 @@ from meshfix_cli.repair import Files, Held, Judge, Method, repair
 from meshfix_cli.untangle import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
     from mpi4py.MPI import Intracomm
 
+    from meshfix_cli.batch import Result
     from meshfix_cli.distributed import Root
     from meshfix_cli.mesh import Mesh
     from meshfix_cli.meshfile import Document
@@ -34,6 +38,10 @@ if TYPE_CHECKING:
 
 _FILE = click.Path(allow_dash=True)  # shells complete it; whether it exists, its reader tells
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
+EXECUTORS = ("processes", "mpi", "dask")
+# Where launchers say how many processes they have started: Open MPI, MVAPICH, Hydra and whatever else speaks PMI, and
+# srun, which comes last since the others may use it to start one of their own on each machine.
+LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]
@@ -90,6 +98,18 @@ class _Requirement(click.ParamType):  # type: ignore[type-arg]
             return value if isinstance(value, Requirement) else Requirement.parse(value)
         except ValueError as error:
             self.fail(str(error), param, ctx)
+
+
+class _Shard(click.ParamType):  # type: ignore[type-arg]
+    name = "I/N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, slice):
+            return value
+        which, slash, count = value.partition("/")
+        if slash and which.isdecimal() and count.isdecimal() and 1 <= int(which) <= int(count):
+            return slice(int(which) - 1, None, int(count))
+        return self.fail(f"{value!r} is not such as 1/8, the first of eight parts", param, ctx)
 
 
 class _Group(click.Group):
@@ -185,7 +205,7 @@ class _Show:
     metrics: tuple[str, ...]
     as_json: bool
     quiet: bool
-    threads: int
+    threads: int = 1
 
     def judge(self, requirements: tuple[Requirement, ...] = ()) -> Judge:
         return Judge(self.metrics, requirements, self.threads, brief=self.quiet)
@@ -198,12 +218,16 @@ class _Show:
 
 
 def _packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[..., Any]:
-    """Add options to a command, which gets their values as one argument `name` of the dataclass `kind`."""
+    """Add options to a command, which gets their values as one argument `name` of the dataclass `kind`.
+
+    A field without an option has its default.
+    """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
         def packed(**values: Any) -> Any:
-            values[name] = kind(**{field.name: values.pop(field.name) for field in fields(kind)})
+            given = [field.name for field in fields(kind) if field.name in values]
+            values[name] = kind(**{field: values.pop(field) for field in given})
             return command(**values)
 
         for option in reversed(options):
@@ -219,31 +243,45 @@ _holding = _packed(
     click.option("--fix", metavar="NAME", help="Hold the vertices where this point-data array is not zero."),
     click.option("--regions", metavar="NAME", help="Hold the interfaces between the regions of this cell-data array."),
 )
+_SHOW = (
+    click.option("--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),
+    click.option("--json", "as_json", is_flag=True, help="Report as JSON, one object and one line for each mesh."),
+    click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
+)
+_showing = _packed("show", _Show, *_SHOW)
 _reporting = _packed(
     "show",
     _Show,
-    click.option("--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),
-    click.option("--json", "as_json", is_flag=True, help="Report as one JSON object."),
-    click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
+    *_SHOW,
     click.option(
         "--threads", type=click.IntRange(1, 1024), default=_cores, help="Default: the cores this process may use."
     ),
 )
+_STORE = (
+    click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
+    click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
+    click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
+)
+_storing = _packed("files", Files, *_STORE)
 _writing = _packed(
     "files",
     Files,
     click.argument("source", metavar="[INPUT]", default="-", type=_FILE),
     click.argument("target", metavar="[OUTPUT]", default="-", type=_FILE),
     click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
-    click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
-    click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
-    click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
+    *_STORE,
     click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
 )
 _solving = _packed(
     "method",
     Method,
-    click.option("--strategy", type=click.Choice(tuple(STRATEGIES)), default="auto", show_default=True),
+    click.option(
+        "--strategy",
+        type=click.Choice(tuple(STRATEGIES)),
+        default="auto",
+        show_default=True,
+        help="How inverted elements are mended; `meshfix untangle --help` explains the names.",
+    ),
     click.option(
         "--sweeps",
         type=click.IntRange(0),
@@ -269,13 +307,15 @@ _solving = _packed(
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
 )
 _cells = click.option("--cells", metavar="FILE", help="Write a .vtu or .vtk with the quality of each element.")
+_allow = click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
 _require = click.option(
     "--require",
     "requirements",
     type=_Requirement(),
     multiple=True,
     metavar="CONDITION",
-    help="Exit with 3 where it is not met, such as 'min_angle >= 5'; may be given more than once.",
+    help="What else a result must meet, such as 'min_angle >= 5', or exit with 3 (a batch: 4); may be given more "
+    "than once.",
 )
 
 
@@ -309,7 +349,7 @@ def main() -> None:
     INPUT and OUTPUT are files, or - for stdin and stdout; a .pvtu stands for its pieces, and 'mesh_*.msh', in quotes,
     for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (nothing was written), 2 wrong usage,
     3 inverted elements remain, the fixed boundary crosses itself or a --require is not met, 4 some of several meshes
-    cannot be read.
+    cannot be read or, in a batch, are not valid.
     """
 
 
@@ -318,7 +358,7 @@ def main() -> None:
 @_solving
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
-@click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
+@_allow
 @click.option("--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes.")
 @click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
 @_require
@@ -474,14 +514,6 @@ def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
     raise AssertionError
 
 
-def _launched() -> int | None:
-    """How many processes the launcher says it has started."""
-    for name in ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"):
-        if name in os.environ:
-            return int(os.environ[name])
-    return None
-
-
 def _check_other(name: str, *meshes: str) -> None:
     """A file beside the mesh must not replace one, and can be written."""
     from meshfix_cli.meshfile import check_target
@@ -502,3 +534,174 @@ def _write_cells(document: Document, mesh: Mesh, target: str, threads: int) -> N
     cell = {**by_element(mesh, threads), "element": document.ids}
     point = {} if mesh is document.mesh else {"distance_moved": distances(document.mesh, mesh)}
     write_cells(document, mesh, target, cell, point)
+
+
+@dataclass(frozen=True)
+class _Listed:
+    """Which files are repaired, and what is kept of them."""
+
+    sources: tuple[str, ...]
+    files_from: str | None
+    shard: slice | None
+    output_dir: str
+    report: str | None
+
+    def pairs(self, *, absolute: bool) -> list[tuple[str, str]]:
+        """Inputs and outputs, checked before any work."""
+        from meshfix_cli.batch import distinct, expanded, named_in, outputs
+        from meshfix_cli.meshfile import check_target
+
+        if self.files_from is not None:
+            _check_input(self.files_from)
+        try:
+            names = [*expanded(self.sources), *(named_in(self.files_from) if self.files_from is not None else ())]
+            sources = distinct(os.path.abspath(name) if absolute else name for name in names)  # noqa: PTH100
+            folder = os.path.abspath(self.output_dir) if absolute else self.output_dir  # noqa: PTH100
+            pairs = list(zip(sources, outputs(sources, folder, self.report), strict=True))
+        except ValueError as error:
+            raise click.UsageError(str(error)) from error
+        if not pairs:
+            raise click.UsageError("there is no IN; name files, or use --files-from")
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        check_target(str(Path(folder) / "mesh"))
+        if self.report is not None:
+            _check_other(self.report)
+        return pairs[self.shard or slice(None)]
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Where the work is done."""
+
+    executor: str
+    scheduler_file: str | None
+    jobs: int | None
+
+    @contextmanager
+    def workers(self) -> Iterator[tuple[Executor | None, int]]:
+        """An executor, None in a process that has worked for another, and how many files it has at once."""
+        if (self.executor == "dask") != (self.scheduler_file is not None):
+            raise click.UsageError("--executor dask and --scheduler-file go together")
+        if self.executor == "processes":
+            from meshfix_cli.batch import Pool
+
+            jobs = self.jobs or _cores()
+            with Pool(jobs) as pool:
+                yield pool, jobs
+            return
+        with self._cluster() as (executor, count):
+            yield executor, self.jobs or 2 * count  # one that is worked on, and one that is on its way
+
+    def _cluster(self) -> AbstractContextManager[tuple[Executor | None, int]]:
+        if self.scheduler_file is not None:
+            from meshfix_cli import dask
+
+            return dask.workers(self.scheduler_file)
+        from meshfix_cli import mpi
+
+        return mpi.workers(_launched())
+
+
+_listing = _packed(
+    "listed",
+    _Listed,
+    click.argument("sources", metavar="IN...", nargs=-1),
+    click.option("--output-dir", metavar="DIR", required=True, help="Outputs go here, under the names of the inputs."),
+    click.option("--files-from", metavar="FILE|-", help="Read names of more inputs, one a line."),
+    click.option("--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),
+    click.option("--report", metavar="FILE", help="Write the options, and each mesh before and after, as JSON."),
+)
+_running = _packed(
+    "where",
+    _Run,
+    click.option(
+        "--executor",
+        type=click.Choice(EXECUTORS),
+        default=EXECUTORS[0],
+        show_default=True,
+        help="Processes on this machine, those that mpiexec has started, or the workers of a Dask cluster.",
+    ),
+    click.option("--scheduler-file", metavar="FILE", help="Of the Dask cluster."),
+    click.option(
+        "--jobs",
+        type=click.IntRange(1, 1024),
+        help="Files at once, each on one thread. [default: a process for each core; of a cluster twice its workers]",
+    ),
+)
+
+
+@main.command()
+@_listing
+@_running
+@click.option("--resume", is_flag=True, help="Skip a file whose output is not older, and valid.")
+@_storing
+@_solving
+@_allow
+@_require
+@_holding
+@_showing
+def batch(
+    listed: _Listed,
+    where: _Run,
+    resume: bool,
+    files: Files,
+    method: Method,
+    allow_inverted: bool,
+    requirements: tuple[Requirement, ...],
+    held: Held,
+    show: _Show,
+) -> None:
+    """Untangle many meshes at once, each into the file of its name in another folder.
+
+    IN is a file or a quoted pattern such as 'run*/**/*.vtk'. A bad file costs only itself. Prints a line for each as
+    it is done, then a summary. Exits with 0 where all are valid, and with 4 where some are not or failed.
+    """
+    from meshfix_cli.batch import Task, run
+    from meshfix_cli.meshfile import write_text
+    from meshfix_cli.report import batch_json, kept
+
+    with where.workers() as (executor, in_flight):
+        if executor is None:
+            return
+        pairs = listed.pairs(absolute=where.executor == "dask")
+        judge = Judge(show.metrics, requirements, brief=show.quiet and listed.report is None)
+        task = Task(files, held, method, judge, resume)
+        passed, done = True, {}
+        try:
+            for result in _told(run(executor, (task.at(*pair) for pair in pairs), in_flight), len(pairs), show):
+                passed &= _passes(result, allow_inverted)
+                if listed.report is not None:
+                    done[result["file"]] = kept(result)
+        finally:  # also where the batch is stopped
+            if listed.report is not None:
+                files_done = [done[source] for source, _ in pairs if source in done]
+                write_text(listed.report, batch_json(task.options, files_done, len(pairs)))
+    sys.exit(VALID if passed else SOME_FAILED)
+
+
+def _told(results: Iterator[Result], total: int, show: _Show) -> Iterator[Result]:
+    """Pass results through and print each, then their summary."""
+    from meshfix_cli.report import Tally, console, print_result, print_tally, with_counts
+
+    start, tally, out, plain = time.perf_counter(), Tally(), console(sys.stdout), not (show.quiet or show.as_json)
+    for result in with_counts(results, total, console(sys.stderr)) if plain else results:
+        if result["status"] == "failed":
+            _complain(f"{result['file']}: {result['error'].removeprefix(result['file'] + ': ')}")
+        if not show.quiet:
+            print_result(result, out, show.as_json)
+        tally.add(result)
+        yield result
+    if plain:
+        print_tally(tally, time.perf_counter() - start, out)
+
+
+def _passes(result: Result, allow_inverted: bool) -> bool:
+    if allow_inverted and result["status"] == "invalid":
+        return all(one["met"] for one in result["requirements"])
+    return result["status"] in ("valid", "skipped")
+
+
+def _launched() -> int | None:
+    """How many processes the launcher of MPI programs says it has started, if there is one."""
+    sizes = [os.environ[name] for name in LAUNCHED if name in os.environ]
+    return int(sizes[0]) if sizes and sizes[0].isdecimal() else None

@@ -46,8 +46,8 @@ class Held:
 class Files:
     """The file that is read and the one that is written; the fields are the options of the command line."""
 
-    source: str
-    target: str
+    source: str = "-"
+    target: str = "-"
     form: str | None = None
     double: bool = False
     fix_orientation: bool = False

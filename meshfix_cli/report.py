@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from meshfix_cli import __version__
 from meshfix_cli.mesh import CELL_NAMES, Mesh
 from meshfix_cli.quality import BIN_WIDTH, Requirement, Summary
 
@@ -25,6 +28,9 @@ SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
 LISTED = 10  # inverted elements named in the report
 
 MEASURE_NAMES = {2: "area", 3: "volume"}
+# What can become of a file of a batch, and how it is told.
+STATUSES = {"valid": "valid", "invalid": "NOT VALID", "failed": "failed", "skipped": "skipped"}
+
 _BARS = " ▁▂▃▄▅▆▇█"
 
 
@@ -169,6 +175,98 @@ def to_json(report: Report) -> dict[str, Any]:
     }
 
 
+@dataclass
+class Tally:
+    """The results of a batch, see `batch.Task.result`, counted as they come.
+
+    Attributes
+    ----------
+    statuses : Counter
+    elements : int
+        Of the meshes that were read.
+    inverted : [int, int]
+        Before and after; files that were skipped count only after.
+    angle : [float, float]
+        The worst of the smallest angles, degrees.
+    """
+
+    statuses: Counter[str] = field(default_factory=Counter)
+    elements: int = 0
+    inverted: list[int] = field(default_factory=lambda: [0, 0])
+    angle: list[float] = field(default_factory=lambda: [math.inf, math.inf])
+
+    def add(self, result: Mapping[str, Any]) -> None:
+        """Count one more."""
+        self.statuses[result["status"]] += 1
+        self.elements += result.get("elements", 0)
+        for i, summary in enumerate(before_and_after(result)):
+            if summary is not None:
+                self.inverted[i] += summary["inverted"]
+                self.angle[i] = min(self.angle[i], summary["min_angle"])
+
+
+def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Return the first and the last summary of a result; what is not known is None."""
+    stages: dict[str, dict[str, Any]] = result.get("quality", {})
+    return stages.get("before"), next(reversed(stages.values()), None)
+
+
+def kept(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the report on a batch keeps of a result."""
+    names = ("file", "output", "status", "error", "seconds", "dimension", "elements", "vertices", "valid", "notes")
+    before, after = before_and_after(result)
+    return {**{name: result.get(name) for name in names}, "before": before, "after": after}
+
+
+def batch_json(options: Mapping[str, Any], files: Sequence[Mapping[str, Any]], total: int) -> str:
+    """Return one JSON object about a batch of so many files, of which some are done: one line for each."""
+    head = {"schema": SCHEMA, "version": __version__, "command": "batch", "options": options, "total": total}
+    lines = ",\n".join(json.dumps(one, allow_nan=False) for one in files)
+    return f'{json.dumps(head, allow_nan=False)[:-1]}, "files": [\n{lines}\n]}}\n'
+
+
+def print_result(result: Mapping[str, Any], out: Console, as_json: bool) -> None:
+    """Print one line at once, so that the log of a batch that is killed tells what was done."""
+    if as_json:
+        out.file.write(json.dumps(result, allow_nan=False) + "\n")
+    elif result["status"] != "failed":
+        out.print(Text(_result_line(result)), soft_wrap=True)
+    out.file.flush()
+
+
+def print_tally(tally: Tally, seconds: float, out: Console) -> None:
+    """Print the summary of a batch."""
+    table, files = Table("", "before", "after"), tally.statuses.total()
+    if not files:
+        out.print("no file falls to this shard: nothing was done")
+        return
+    for column in table.columns[1:]:
+        column.justify = "right"
+    table.add_row("files", "", f"{files:,}")
+    for status, label in STATUSES.items():
+        table.add_row(label, "", f"{tally.statuses[status]:,}")
+    table.add_row("elements", "", f"{tally.elements:,}")
+    table.add_row("inverted elements", *(f"{count:,}" for count in tally.inverted))
+    table.add_row(
+        "smallest angle of all [°]", *(f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle)
+    )
+    out.print(table)
+    out.print(Text(f"{seconds:.3g} s, {files / max(seconds, 1e-9):.3g} files a second"))
+
+
+def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> Iterator[dict[str, Any]]:
+    """Pass results through and show on a terminal how many there are; the line is gone while one is looked at."""
+    if not out.is_terminal:
+        yield from results
+        return
+    with out.status(f"0 of {total:,} files") as status:
+        for done, result in enumerate(results, 1):
+            status.stop()
+            yield result
+            status.update(f"{done:,} of {total:,} files")
+            status.start()
+
+
 def history_csv(records: Iterable[SweepRecord]) -> str:
     """Return a line for each sweep: the series of the paper's figure 4.4."""
     rows = [asdict(record) for record in records]
@@ -199,6 +297,20 @@ def with_progress(
 def _sweep(record: SweepRecord, dimension: int) -> str:
     name = f"{record.phase} {record.sweep}" if record.sweep else record.phase
     return f"{name}: {record.inverted:,} inverted, smallest {MEASURE_NAMES[dimension]} {record.min_measure:.3g}"
+
+
+def _result_line(result: Mapping[str, Any]) -> str:
+    before, after = before_and_after(result)
+    parts = [f"{result['file']}: {STATUSES[result['status']]}"]
+    if before and after:
+        parts.append(f"{before['inverted']:,} inverted -> {after['inverted']:,}")
+        parts.append(f"smallest angle {before['min_angle']:.3f}° -> {after['min_angle']:.3f}°")
+    parts += [f"NOT MET: {one['requirement']}" for one in result["requirements"] if not one["met"]]
+    if result["misnumbered"]:
+        parts.append(f"{result['misnumbered']:,} numbered against the rest of the mesh")
+    if result["obstacles"]["crossing"]:
+        parts.append("the fixed boundary crosses itself")
+    return ", ".join([*parts, f"{result['seconds']:.3g} s"])
 
 
 def _summary_json(summary: Summary) -> dict[str, Any]:

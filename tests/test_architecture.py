@@ -27,10 +27,14 @@ ALLOWED = {
     "meshfile": {"_kernels", "errors", "mesh"},
     "report": {"mesh", "obstacles", "quality", "untangle"},
     "mpi": {"errors"},
+    "dask": {"errors"},
     "distributed": {"_kernels", "errors", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},
     "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "team", "untangle"},
+    "batch": {"errors", "repair", "report"},
     "cli": {
         "_kernels",
+        "batch",
+        "dask",
         "distributed",
         "errors",
         "mesh",
@@ -46,8 +50,10 @@ ALLOWED = {
     "__init__": {"mesh", "meshfile", "perturb", "quality", "untangle"},
     "__main__": {"cli"},
 }
-OWNERS = {"rich": {"report"}, "scipy": {"foldover"}, "meshio": {"meshfile"}, "click": {"cli"}}
-OWNERS |= {"mpi4py": {"cli", "distributed", "mpi"}, "pymetis": {"distributed"}}
+OWNERS = {
+    "rich": {"report"}, "scipy": {"foldover"}, "meshio": {"meshfile"}, "click": {"cli"}, "distributed": {"dask"},
+    "mpi4py": {"cli", "distributed", "mpi"}, "pymetis": {"distributed"},
+}  # fmt: skip
 
 
 def imports(path: Path) -> set[str]:

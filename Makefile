@@ -57,10 +57,11 @@ fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format
 stress: $(VENV)/installed ## untangle 259 hard cases; which are solved, how fast and how well
 	$(BIN)/python benchmarks/stress.py
 
-bench: $(VENV)/installed ## kernels, with MESH=FILE for a mesh of yours; the whole process up to 10 million tets; files
+bench: $(VENV)/installed ## kernels, MESH=FILE for a mesh of yours; the process up to 10 million tets; files; many meshes
 	$(BIN)/python benchmarks/kernels.py $(MESH)
 	$(BIN)/python benchmarks/process.py
 	$(BIN)/python benchmarks/files.py
+	$(BIN)/python benchmarks/batch.py
 
 scaling: $(VENV)/developer ## one mesh over 1, 2 and 4 processes, and a prediction for larger machines
 	$(BIN)/python benchmarks/scaling.py

@@ -221,8 +221,11 @@ def _alone(executor: Executor, task: Task, function: Callable[[Task], Result]) -
     error = _error(future)
     if error is None:
         return future.result()
-    broken = isinstance(error, BrokenExecutor)
-    text = "the worker died, twice (out of memory?)" if broken else f"{type(error).__name__}, twice: {error}"
+    text = f"{type(error).__name__}, twice: {error}"
+    if isinstance(error, BrokenExecutor):
+        text = "the worker died, twice (out of memory?)"
+    elif isinstance(error, CancelledError):
+        text = "the workers have gone"
     return task.result("failed", time.perf_counter() - start, text)
 
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from concurrent.futures import Executor
+import json
+import logging
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from meshfix_cli.errors import MeshfixError
+
+if TYPE_CHECKING:
+    from distributed import Client
 
 
 @contextmanager
@@ -28,15 +34,30 @@ def workers(scheduler_file: str) -> Iterator[tuple[Executor | None, int]]:
         from distributed import Client
     except ImportError as error:
         raise MeshfixError(f"Dask is not installed: pip install 'meshfix-cli[dask]' ({error})") from error
-    if not Path(scheduler_file).is_file():  # the client would wait for it
-        raise MeshfixError(f"{scheduler_file}: No such file: is the Dask scheduler running?")
+    for name in ("distributed", "distributed.client"):  # they log what is told below, with tracebacks
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
-        client = Client(scheduler_file=scheduler_file)
-    except (OSError, ValueError, KeyError) as error:
-        raise MeshfixError(f"{scheduler_file}: no Dask scheduler answers: {error}") from error
-    with client:
-        executor = client.get_executor()
-        try:
-            yield executor, max(1, sum(client.nthreads().values()))
-        finally:
-            executor.shutdown(wait=False)
+        address = json.loads(Path(scheduler_file).read_bytes())["address"]
+    except OSError as error:
+        raise MeshfixError(f"{scheduler_file}: {error.strerror}; is the Dask scheduler running?") from error
+    except (ValueError, KeyError, TypeError) as error:
+        raise MeshfixError(f"{scheduler_file}: is not a file of a Dask scheduler") from error
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        raise MeshfixError(f"{scheduler_file}: no Dask scheduler answers at {address}: {error}") from error
+    with client:  # at its end the scheduler forgets what was not begun
+        yield _Cluster(client), max(1, sum(client.nthreads().values()))
+
+
+class _Cluster(Executor):
+    """What `client.get_executor()` gives, but for a scheduler that has gone, where that one waits for ever."""
+
+    def __init__(self, client: Client) -> None:
+        self._client, self._executor = client, client.get_executor()
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        if self._client.status != "running":
+            raise MeshfixError("the Dask scheduler has gone")
+        future: Future[Any] = self._executor.submit(fn, *args, **kwargs)
+        return future

@@ -29,8 +29,8 @@ def world(launched: int | None = None) -> Intracomm:
         believes that it is alone.
     """
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # of launchers: it is an error, below
+        with warnings.catch_warnings():  # what it suspects of the launcher is looked at below
+            warnings.filterwarnings("ignore", "suspicious MPI execution environment", RuntimeWarning)
             from mpi4py import MPI
     except ImportError as error:
         raise MeshfixError(

@@ -251,7 +251,7 @@ def print_tally(tally: Tally, seconds: float, out: Console) -> None:
         "smallest angle of all [°]", *(f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle)
     )
     out.print(table)
-    out.print(Text(f"{seconds:.3g} s, {files / max(seconds, 1e-9):.3g} files a second"))
+    out.print(Text(f"{seconds:.3g} s, {files / max(seconds, 1e-9):,.2f} files a second"))
 
 
 def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> Iterator[dict[str, Any]]:

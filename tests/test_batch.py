@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -14,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import SAMPLES
+from conftest import ROOT, SAMPLES
 from test_cli import MESHFIX, TANGLED, VALID, error_line, run
 
 from meshfix_cli import __version__, batch, read
@@ -389,3 +390,121 @@ def test_options_reach_the_work(inputs: Path, out: Path) -> None:
     assert told["displacement"]["largest"] <= 0.35
     assert (out / "a.vtk.bak").exists()
     assert run("batch", SAMPLES / "bracket.vtk", "--smooth", 0, "--output-dir", out).stdout.count(b"0 inverted -> 0")
+
+
+def shown(start: str) -> list[str]:
+    """The words of a command that the README shows for clusters, for three processes at most."""
+    (line,) = (line for line in (ROOT / "README.md").read_text().splitlines() if line.startswith(start))
+    place = str(Path(MESHFIX).parent)
+    return ["env", f"PATH={place}{os.pathsep}{os.environ['PATH']}", *shlex.split(line.replace("-n 64", "-n 3"))]
+
+
+@pytest.fixture
+def cluster(tmp_path: Path) -> Path:
+    """The folder that the README's commands speak of; mesh 3 is not one."""
+    meshes = tmp_path / "meshes"
+    meshes.mkdir()
+    fill(meshes, *(f"{i}.vtk" for i in range(7)))
+    (meshes / "3.vtk").write_bytes(b"")
+    return tmp_path
+
+
+def check_cluster(folder: Path, command: list[str]) -> None:
+    """All files but one are repaired, by more than one worker."""
+    done = subprocess.run([*command, "--json"], cwd=folder, capture_output=True, check=False, timeout=60)
+    assert done.returncode == 4, done.stderr.decode()
+    assert statuses(done) == {f"{i}.vtk": "failed" if i == 3 else "valid" for i in range(7)}
+    (complaint,) = done.stderr.decode().splitlines()
+    assert complaint.startswith("meshfix: error: ")
+    assert complaint.endswith("meshes/3.vtk: is empty")
+    assert len(list((folder / "repaired").iterdir())) == 6
+
+
+def test_mpi(cluster: Path) -> None:
+    pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
+    command = shown("mpiexec")
+    if shutil.which("mpiexec", path=command[1].removeprefix("PATH=")) is None:
+        pytest.skip("there is no mpiexec")
+    check_cluster(cluster, command)
+    wrong = subprocess.run(
+        [*command, "--output-dir", "meshes"], cwd=cluster, capture_output=True, check=False, timeout=60
+    )
+    assert wrong.stderr.count(b"would replace the input") == 1
+
+
+@pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"])
+def test_the_launcher_of_another_mpi_is_refused(variable: str, cluster: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
+    try:
+        from mpi4py import MPI
+    except RuntimeError:
+        pytest.skip("there is no MPI library")
+    assert MPI.COMM_WORLD.Get_size() == 1
+    monkeypatch.setenv(variable, "4")
+    arguments = ["batch", "--executor", "mpi", "--output-dir", cluster / "repaired", cluster / "meshes" / "*.vtk"]
+    assert "the launcher started 4 processes, and mpi4py sees 1: it uses another MPI" in error_line(*arguments)
+    assert not (cluster / "repaired").exists()
+
+
+@pytest.mark.parametrize(
+    ("module", "raised", "words"),
+    [
+        ("mpi4py", "ImportError('no such module')", "pip install 'meshfix-cli[mpi]' mpich"),
+        ("mpi4py", "RuntimeError('cannot load MPI library')", "load the cluster's own, or pip install mpich"),
+        ("distributed", "ImportError('no such module')", "Dask is not installed: pip install 'meshfix-cli[dask]'"),
+    ],
+)
+def test_what_is_not_installed_is_named(
+    module: str, raised: str, words: str, cluster: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (cluster / f"{module}.py").write_text(f"raise {raised}")
+    monkeypatch.setenv("PYTHONPATH", str(cluster))
+    where = ["--executor", "mpi"] if module == "mpi4py" else ["--executor", "dask", "--scheduler-file", "s.json"]
+    assert words in error_line("batch", *where, "--output-dir", cluster / "repaired", cluster / "meshes" / "*.vtk")
+
+
+def test_dask(cluster: Path) -> None:
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    programs = [
+        [*shown("dask scheduler")[:-1], "--port", "0", "--dashboard-address", ":0"],
+        [
+            *shown("srun -n 64 dask worker")[:2],
+            *shown("srun -n 64 dask worker")[5:-1],
+            "--nworkers",
+            "2",
+        ],
+    ]
+    running = [
+        subprocess.Popen(program, cwd=cluster, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        for program in programs
+    ]
+    try:
+        for _ in range(600):
+            if (cluster / "scheduler.json").exists():
+                break
+            time.sleep(0.05)
+        check_cluster(cluster, shown("meshfix batch --executor dask"))
+    finally:
+        for program in running[::-1]:
+            program.terminate()
+            program.wait(timeout=30)
+
+
+def test_a_scheduler_file_that_is_none(cluster: Path) -> None:
+    pytest.importorskip("distributed", reason="the extra dask is not installed")
+    (cluster / "s.json").write_text("{}")
+    for name, words in (
+        ("s.json", "is not a file of a Dask scheduler"),
+        ("none.json", "is the Dask scheduler running?"),
+    ):
+        where = ["--executor", "dask", "--scheduler-file", cluster / name]
+        line = error_line("batch", *where, "--output-dir", cluster / "repaired", cluster / "meshes" / "*.vtk")
+        assert words in line
+
+
+def test_a_job_of_a_slurm_array(cluster: Path) -> None:
+    (wrapped,) = (word for word in shown("sbatch") if word.startswith("meshfix"))
+    environment = {**os.environ, "SLURM_ARRAY_TASK_ID": "2"}
+    command = [*shown("sbatch")[:2], "bash", "-c", wrapped.replace("\\$", "$") + " --json"]
+    done = subprocess.run(command, cwd=cluster, env=environment, capture_output=True, check=False)
+    assert statuses(done) == {"1.vtk": "valid"}

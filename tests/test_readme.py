@@ -10,12 +10,13 @@ from pathlib import Path
 
 import pytest
 
+from meshfix_cli.cli import main
 from meshfix_cli.untangle import STRATEGIES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
-SECONDS = re.compile(r"\d[\d.e-]* s\b")
+SECONDS = re.compile(r"\d[\d.,e-]* (s\b|files a second)")
 
 
 def blocks(language: str) -> list[str]:
@@ -58,6 +59,14 @@ def test_python_example_prints_what_is_shown(folder: Path) -> None:
     (example,) = blocks("python")
     (output,) = blocks("text")
     assert run([sys.executable, "-c", example], folder) == output
+
+
+def test_options_of_commands_for_clusters_exist() -> None:
+    commands = re.findall(r"meshfix (\w+) ([^\n]*)", "".join(blocks("sh")))
+    assert {name for name, _ in commands} == {"batch"}
+    for name, arguments in commands:
+        known = {option for parameter in main.commands[name].params for option in parameter.opts}
+        assert set(re.findall(r"--[a-z-]+", arguments.partition(":::")[0])) <= known
 
 
 def test_make_targets_exist() -> None:

@@ -272,15 +272,25 @@ class Pool(Executor):
 
 @contextmanager
 def _deaf_children() -> Iterator[None]:
-    """Start processes that do not hear what the terminal tells the whole group: it is the parent that ends them."""
-    if not hasattr(signal, "pthread_sigmask"):
+    """Start processes, and all of each: what would stop this one in between is heard afterwards.
+
+    They do not hear what the terminal tells the whole group: it is this process that ends them.
+    """
+    if not hasattr(signal, "pthread_sigmask") or threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGHUP})
+    heard: list[int] = []
+    stops = {signal.SIGINT, signal.SIGHUP, signal.SIGTERM}
+    handlers = {number: signal.signal(number, lambda number, _: heard.append(number)) for number in stops}
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, stops - {signal.SIGTERM})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        if heard:
+            signal.raise_signal(heard[0])
 
 
 def _end_with_the_parent() -> None:
@@ -301,15 +311,16 @@ def _stoppable(function: Callable[..., Any], *arguments: Any) -> Any:
     try:
         return function(*arguments)
     except KeyboardInterrupt:  # the pool would take it for a result
-        signal.raise_signal(signal.SIGTERM)
-        raise
+        pass
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    return signal.raise_signal(signal.SIGTERM)
 
 
 def _unwind(number: int, frame: object) -> None:
+    """Leave what is being done; a second signal must not disturb the clearing up."""
     del frame
-    signal.signal(number, signal.SIG_DFL)
+    signal.signal(number, signal.SIG_IGN)
     if hasattr(signal, "setitimer"):
         signal.setitimer(signal.ITIMER_REAL, GRACE)  # ends the process even if the pool has caught the exception
     raise KeyboardInterrupt

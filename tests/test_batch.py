@@ -15,10 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT, SAMPLES
-from test_cli import MESHFIX, TANGLED, VALID, error_line, run
+from conftest import ROOT
+from test_cli import MESHFIX, TANGLED, error_line, on_terminal, run
 
 from meshfix_cli import __version__, batch, read
+from meshfix_cli.quality import Requirement
 from meshfix_cli.repair import Files, Held, Judge, Method
 
 POSIX = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs signals and /proc")
@@ -137,8 +138,8 @@ def test_what_is_not_valid_or_not_met_exits_4(inputs: Path, out: Path) -> None:
     run(*arguments, "--allow-inverted")
     line = run("batch", "--require", "min_angle > 80", path, "--output-dir", out, code=4).stdout
     assert b"0, smallest angle 0.022\xc2\xb0 -> 30.703\xc2\xb0, NOT MET: min_angle > 80" in line
-    run("batch", "--require", "min_angle > 80", "--allow-inverted", path, "--output-dir", out, code=4)
-    assert run("batch", "--quiet", path, "--output-dir", out).stdout == b""
+    arguments = ["--quiet", "--require", "min_angle > 80", "--allow-inverted", path, "--output-dir", out]
+    assert run("batch", *arguments, code=4).stdout == b""
 
 
 def test_json_lines(inputs: Path, out: Path) -> None:
@@ -152,6 +153,15 @@ def test_json_lines(inputs: Path, out: Path) -> None:
     assert told["a.vtk"]["quality"]["smoothed"].keys() == single["quality"]["smoothed"].keys()
     assert told["a.vtk"]["output"] == str(out / "a.vtk")
     assert told["bad.vtk"]["error"].endswith("is empty")
+
+
+def test_progress_is_for_terminals(inputs: Path, out: Path) -> None:
+    fill(inputs, "a.vtk", "b.vtk")
+    code, shown = on_terminal("batch", "--jobs", 1, inputs / "*.vtk", "--output-dir", out)
+    assert code == 0
+    assert "0 of 2 files" in shown
+    assert "1 of 2 files" in shown
+    assert shown.count(": valid, 89 inverted -> 0") == 2
 
 
 def test_files_are_found_in_order_and_once(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,11 +179,9 @@ def test_files_are_found_in_order_and_once(inputs: Path, tmp_path: Path, monkeyp
 
 
 def test_files_from_a_list(inputs: Path, out: Path) -> None:
-    names = "\n".join(map(str, fill(inputs, "a.vtk", "b.vtk")))
-    (inputs / "list").write_text(names)
-    for files_from, data in ((inputs / "list", None), ("-", names.encode())):
-        done = run("batch", "--json", "--files-from", files_from, "--output-dir", out, inputs / "a.vtk", data=data)
-        assert statuses(done) == {"a.vtk": "valid", "b.vtk": "valid"}
+    names = "\n".join(map(str, fill(inputs, "a.vtk", "b.vtk"))).encode()
+    done = run("batch", "--json", "--files-from", "-", "--output-dir", out, inputs / "a.vtk", data=names)
+    assert statuses(done) == {"a.vtk": "valid", "b.vtk": "valid"}
     assert "No such file" in error_line("batch", "--files-from", inputs / "none", "--output-dir", out)
 
 
@@ -318,9 +326,10 @@ def test_a_file_that_kills_its_worker_fails_alone(inputs: Path, out: Path, envir
     fill(inputs, "deadly.vtk", *names, "deadly2.vtk")
     done = run("batch", "--json", "--jobs", 2, inputs / "*.vtk", "--output-dir", out, code=4)
     assert statuses(done) == {**dict.fromkeys(names, "valid"), "deadly.vtk": "failed", "deadly2.vtk": "failed"}
-    assert done.stderr.decode().splitlines()[0] == (
-        f"meshfix: error: {inputs / 'deadly.vtk'}: the worker died, twice (out of memory?)"
-    )
+    assert sorted(done.stderr.decode().splitlines()) == [
+        f"meshfix: error: {inputs / name}: the worker died, twice (out of memory?)"
+        for name in ("deadly.vtk", "deadly2.vtk")
+    ]
     assert sorted(p.name for p in out.iterdir() if p.is_file()) == names
 
 
@@ -356,6 +365,8 @@ def test_workers_end_with_the_command(inputs: Path, out: Path, environment: Path
     fill(inputs, "a.vtk", "slow.vtk")
     process = start("--jobs", 2, inputs / "*.vtk", "--output-dir", out)
     who_waits(environment)
+    assert process.stdout is not None
+    assert b"a.vtk" in process.stdout.readline()
     assert len(alive(process.pid)) >= 3
     process.kill()
     wait_for_the_end_of_all(process.pid)
@@ -364,32 +375,36 @@ def test_workers_end_with_the_command(inputs: Path, out: Path, environment: Path
 
 
 def test_resume_does_again_what_is_old_broken_or_not_good_enough(inputs: Path, out: Path) -> None:
+    out.mkdir()
     paths = fill(inputs, "bad.vtk", "good.vtk", "old.vtk", "tangled.vtk")
-    arguments = ["batch", "--json", "--resume", *paths, "--output-dir", out]
-    assert set(statuses(run(*arguments)).values()) == {"valid"}
+
+    def again(*requirements: str) -> list[str]:
+        judge = Judge(requirements=tuple(map(Requirement.parse, requirements)))
+        task = batch.Task(Files(), Held(), Method(), judge, resume=True)
+        return [batch.work(task.at(str(path), str(out / path.name)))["status"] for path in paths]
+
+    assert again() == ["valid"] * 4
     (out / "bad.vtk").write_bytes(b"# vtk DataFile Version 3.0\n")
     os.utime(out / "old.vtk", (1, 1))
     shutil.copy(TANGLED, out / "tangled.vtk")
-    again = results(run(*arguments))
-    assert {name: one["status"] for name, one in again.items()} == {
-        "bad.vtk": "valid", "good.vtk": "skipped", "old.vtk": "valid", "tangled.vtk": "valid",
-    }  # fmt: skip
-    assert again["good.vtk"]["quality"]["after"]["inverted"] == 0
-    assert set(statuses(run(*arguments)).values()) == {"skipped"}
-    assert b"skipped, " in run("batch", "--resume", paths[1], "--output-dir", out).stdout
-    more = run(*arguments, "--require", "min_angle > 40", code=4)
-    assert set(statuses(more).values()) == {"invalid"}
+    assert again() == ["valid", "skipped", "valid", "valid"]
+    assert again("min_angle > 5") == ["skipped"] * 4
+    assert again("min_angle > 40") == ["invalid"] * 4
+    paths[0].unlink()
+    assert again() == ["failed", *["skipped"] * 3]
+    told = run("batch", "--resume", paths[1], "--output-dir", out).stdout.decode()
+    assert f"{paths[1]}: skipped, " in told
 
 
 def test_options_reach_the_work(inputs: Path, out: Path) -> None:
-    shutil.copy(VALID, inputs / "valid.vtk")
+    out.mkdir()
     (path,) = fill(inputs, "a.vtk")
+    (out / "a.vtk").write_text("precious")
     options = ["--max-move", "0.35", "--only-invalid", "--smooth", 0, "--backup"]
-    for _ in range(2):
-        (told,) = results(run("batch", "--json", *options, path, "--output-dir", out)).values()
+    (told,) = results(run("batch", "--json", *options, path, "--output-dir", out)).values()
     assert told["displacement"]["largest"] <= 0.35
-    assert (out / "a.vtk.bak").exists()
-    assert run("batch", SAMPLES / "bracket.vtk", "--smooth", 0, "--output-dir", out).stdout.count(b"0 inverted -> 0")
+    assert {one["phase"] for one in told["sweeps"]} == {"input", "Laplacian"}
+    assert (out / "a.vtk.bak").read_text() == "precious"
 
 
 def shown(start: str) -> list[str]:

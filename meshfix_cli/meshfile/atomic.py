@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
+import shutil
 import stat
 import sys
 import tempfile
@@ -39,9 +41,9 @@ def write_file(target: str, produce: Callable[[Path], object], backup: bool = Fa
     """
     streamed = is_stream(target)
     path = Path(target) if streamed else Path(target).resolve()
-    parent = None if streamed else path.parent
-    with _sentence(target), tempfile.TemporaryDirectory(prefix=".meshfix-", dir=parent) as folder:
-        temporary = Path(folder) / (path.name if path.suffix else "mesh")
+    parent = Path(tempfile.gettempdir()) if streamed else path.parent
+    with _sentence(target), _folder(parent) as folder:
+        temporary = folder / (path.name if path.suffix else "mesh")
         produce(temporary)
         if target == "-":
             sys.stdout.buffer.write(temporary.read_bytes())
@@ -80,8 +82,7 @@ def _stage(stack: contextlib.ExitStack, target: str, data: bytes) -> tuple[Path,
         for missing in [folder for folder in reversed(path.parents) if not folder.exists()]:
             missing.mkdir()
             stack.callback(_remove_empty, missing)
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix=".meshfix-", dir=path.parent))
-        temporary = Path(folder) / path.name
+        temporary = stack.enter_context(_folder(path.parent)) / path.name
         temporary.write_bytes(data)
         _complete(temporary, path)
     return temporary, path
@@ -108,6 +109,19 @@ def _sentence(target: str) -> Iterator[None]:
     except OSError as error:
         name = "<stdout>" if target == "-" else target
         raise WriteError(f"{name}: {error.strerror or error}") from error
+
+
+@contextlib.contextmanager
+def _folder(parent: Path) -> Iterator[Path]:
+    """Make a folder that is gone in the end, also where a signal comes while it is made or removed."""
+    folder = parent / f".meshfix-{secrets.token_hex(8)}"
+    try:
+        folder.mkdir(0o700)
+        yield folder
+        shutil.rmtree(folder)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def write_text(target: str, text: str) -> None:

@@ -605,7 +605,7 @@ class _Run:
 _listing = _packed(
     "listed",
     _Listed,
-    click.argument("sources", metavar="IN...", nargs=-1),
+    click.argument("sources", metavar="[IN]...", nargs=-1),
     click.option("--output-dir", metavar="DIR", required=True, help="Outputs go here, under the names of the inputs."),
     click.option("--files-from", metavar="FILE|-", help="Read names of more inputs, one a line."),
     click.option("--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),

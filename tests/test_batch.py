@@ -259,6 +259,40 @@ def test_only_so_many_files_are_out() -> None:
     assert max(seen) == (3, 3)
 
 
+class Now(Executor):
+    """Does at once what it is asked to."""
+
+    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args))
+        except OSError as error:
+            future.set_exception(error)
+        return future
+
+
+def test_what_raises_is_tried_once_more_after_the_others() -> None:
+    tried: list[str] = []
+
+    def fail(task: batch.Task) -> batch.Result:
+        tried.append(task.files.source)
+        if task.files.source == "1.vtk" or tried.count(task.files.source) == 1:
+            raise OSError("gone")
+        return name(task)
+
+    told = {one["file"]: one for one in batch.run(Now(), iter(tasks(4)), 2, fail)}
+    assert [sorted(tried[i : i + 2]) for i in (0, 2, 4, 6)] == [["0.vtk", "1.vtk"]] * 2 + [["2.vtk", "3.vtk"]] * 2
+    assert [told[f"{i}.vtk"]["status"] for i in range(4)] == ["valid", "failed", "valid", "valid"]
+    assert told["1.vtk"]["error"] == "OSError, twice: gone"
+
+
+def test_a_reader_that_goes_away_is_no_traceback(inputs: Path, out: Path) -> None:
+    fill(inputs, *(f"{i}.vtk" for i in range(9)))
+    command = f"{MESHFIX} batch '{inputs}/*.vtk' --output-dir {out} | head -n 1"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, check=False)
+    assert (done.stdout.count(b"\n"), done.stderr) == (1, b"")
+
+
 @pytest.fixture
 def environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Give all processes the slow disk; the folder in which it tells who waits for it."""

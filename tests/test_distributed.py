@@ -178,30 +178,24 @@ main(["untangle", "--mpi", "-q", sys.argv[1], sys.argv[1]])
 """
 
 
-def failing(environment: dict[str, str], *prefix: str) -> str:
-    words = prefix or MESHFIX
-    command = [*words, "untangle", "--mpi", "-q", "--dry-run", str(SAMPLES / "plate_tangled.vtk")]
-    done = subprocess.run(
-        command, capture_output=True, text=True, check=False, timeout=60, env={**os.environ, **environment}
-    )
+def failing(environment: dict[str, str], *command: str) -> str:
+    words = [*command, "untangle", "--mpi", "-q", "--dry-run", str(SAMPLES / "plate_tangled.vtk")]
+    environment = {**os.environ, **environment}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60, env=environment)
     assert done.returncode == 1, done.stderr
     assert done.stderr.count("\n") == 1, done.stderr
     return done.stderr
 
 
+@needs_mpi
 def test_the_launcher_of_another_mpi_is_refused() -> None:
-    pytest.importorskip("mpi4py", reason="mpi4py is not installed")
-    assert "the launcher started 4 processes" in failing({"OMPI_COMM_WORLD_SIZE": "4"})
+    assert "the launcher started 4 processes" in failing({"OMPI_COMM_WORLD_SIZE": "4"}, *MESHFIX)
 
 
-def test_a_missing_mpi_library_or_package_is_named() -> None:
-    pytest.importorskip("mpi4py", reason="mpi4py is not installed")
-    assert "pip install mpi4py mpich" in failing({"MPI4PY_LIBMPI": "/nowhere/libmpi.so"})
-    hidden = "import sys; sys.modules['mpi4py'] = None; from meshfix_cli.cli import main; main()"
-    assert "mpi4py is not installed" in failing({}, sys.executable, "-c", hidden)
-    hidden = hidden.replace("mpi4py", "pymetis")
-    if MPIEXEC is not None:
-        assert "pymetis is not installed" in failing({}, MPIEXEC, "-n", "2", sys.executable, "-c", hidden)
+@needs_mpi
+def test_a_missing_partitioner_is_named_once() -> None:
+    hidden = "import sys; sys.modules['pymetis'] = None; from meshfix_cli.cli import main; main()"
+    assert "pymetis is not installed" in failing({}, str(MPIEXEC), "-n", "2", sys.executable, "-c", hidden)
 
 
 def all_parts(mesh: Mesh, ranks: int) -> list[Part]:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from meshfix_cli.meshfile import Document
     from meshfix_cli.meshfile.formats import Format
     from meshfix_cli.quality import Requirement
+    from meshfix_cli.repair import Steps
     from meshfix_cli.report import Report
 
 _FILE = click.Path(allow_dash=True)  # shells complete it; whether it exists, its reader tells
@@ -390,14 +391,14 @@ def untangle(
         raise click.UsageError("--quiet and --verbose exclude each other")
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
-    with _processes(method, show.threads) if mpi else nullcontext() as root:
+    silent = show.quiet or (show.as_json and not verbose)
+    watch = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
+    with _processes(method, show.threads, watch) if mpi else nullcontext() as root:
         if root and files.source == "-":
             raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
         document, output = _open(files, held, show, history, cells)
         if cells is not None:
             check_cells(document, cells)
-        silent = show.quiet or (show.as_json and not verbose)
-        watch = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
         solve, put = (
             (root.solve, root.put) if root else (partial(method.solve, threads=show.threads, watch=watch), None)
         )
@@ -476,7 +477,7 @@ def quality(
 
 
 @contextmanager
-def _processes(method: Method, threads: int) -> Iterator[Root]:
+def _processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) -> Iterator[Root]:
     """Give the root those that mpiexec has started; they work for it, and end as it does."""
     from meshfix_cli.distributed import ROOT, Root, serve
     from meshfix_cli.mpi import world
@@ -488,7 +489,7 @@ def _processes(method: Method, threads: int) -> Iterator[Root]:
         except BaseException as error:
             _abort(comm, error)
         sys.exit(code)
-    root, code = Root(comm, method, threads), ERROR
+    root, code = Root(comm, method, threads, watch), ERROR
     try:
         yield root
     except BaseException as error:

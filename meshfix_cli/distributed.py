@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm, Request
 
     from meshfix_cli.meshfile.splice import Places
+    from meshfix_cli.repair import Steps
 
 ROOT = 0
 Array = NDArray[np.float64]
@@ -81,10 +82,12 @@ class Root:
         The same in all processes.
     threads : int
         Of each process.
+    watch : callable
+        Passes the steps through, to show them.
     """
 
-    def __init__(self, comm: Intracomm, method: Method, threads: int) -> None:
-        self.comm, self.method, self.threads = comm, method, threads
+    def __init__(self, comm: Intracomm, method: Method, threads: int, watch: Callable[[Steps], Steps] = iter) -> None:
+        self.comm, self.method, self.threads, self.watch = comm, method, threads, watch
         self.owned: list[NDArray[np.int32]] = []
         self.busy = False  # the others are at work, and would wait for ever if this process ended
 
@@ -107,7 +110,7 @@ class Root:
             else:
                 self.comm.send(part, rank)
         assert own is not None
-        before, untangled, after, records, ranks = _solved(self.comm, self.method, self.threads, own, mesh)
+        before, untangled, after, records, ranks = _solved(self.comm, self.method, self.threads, own, mesh, self.watch)
         self.busy = False
         assert before is not None and untangled is not None and after is not None
         return Outcome(before, untangled, after, records, find_obstacles(mesh, self.threads), ranks)
@@ -175,11 +178,16 @@ def _put(comm: Intracomm, path: str, size: int, offsets: NDArray[np.int64], valu
 
 
 def _solved(
-    comm: Intracomm, method: Method, threads: int, part: Part, whole: Mesh | None
+    comm: Intracomm,
+    method: Method,
+    threads: int,
+    part: Part,
+    whole: Mesh | None,
+    watch: Callable[[Steps], Steps] = iter,
 ) -> tuple[Mesh | None, Mesh | None, Mesh | None, tuple[SweepRecord, ...], tuple[RankRecord, ...]]:
     """Solve one part; the root gets the whole mesh as it came, untangled and smoothed, the others None."""
     team = Ranks(comm, part, None if whole is None else whole.topology.stars(threads), threads)
-    *stages, records = drain(method.steps(team.mesh, part.reach, threads, team))
+    *stages, records = drain(watch(method.steps(team.mesh, part.reach, threads, team)))
     known = {id(stages[0]): whole}
     for stage in stages:
         if id(stage) not in known:

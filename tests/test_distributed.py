@@ -118,6 +118,16 @@ def test_stdout_and_the_report() -> None:
 
 
 @needs_mpi
+def test_sweeps_are_shown_once(tmp_path: Path) -> None:
+    sample, out = SAMPLES / "bracket_tangled.vtk", tmp_path / "o.vtk"
+    together = mpiexec(2, *MESHFIX, "untangle", "--mpi", "-v", sample, out).stderr
+    alone = subprocess.run([*MESHFIX, "untangle", "-v", sample, out], capture_output=True, text=True, check=True).stderr
+    assert [line.rsplit(",", 1)[0] for line in together.splitlines()] == [
+        line.rsplit(",", 1)[0] for line in alone.splitlines()
+    ]
+
+
+@needs_mpi
 def test_stdin_is_refused_once() -> None:
     done = mpiexec(2, *MESHFIX, "untangle", "--mpi", code=2)
     assert done.stderr.count("INPUT is a file") == 1

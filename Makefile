@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
-.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables man samples clean
+.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs man samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -71,6 +71,9 @@ compare: $(VENV)/developer ## beside gmsh's UntangleMeshGeometry; MESH=FILE or T
 
 tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 	$(BIN)/python benchmarks/tables.py $(or $(MESH),sample_meshes/bracket.vtk)
+
+docs: $(VENV)/developer ## make the pages in docs/ a site in out/site
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir out/site
 
 RELEASED := 2026-11-26
 man: $(VENV)/developer ## make the manual pages in man/ of the help

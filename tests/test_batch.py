@@ -442,15 +442,15 @@ def test_options_reach_the_work(inputs: Path, out: Path) -> None:
 
 
 def shown(start: str) -> list[str]:
-    """The words of a command that the README shows for clusters, for three processes at most."""
-    (line,) = (line for line in (ROOT / "README.md").read_text().splitlines() if line.startswith(start))
+    """The words of a command that docs/many.md shows for clusters, for three processes at most."""
+    (line,) = (line for line in (ROOT / "docs/many.md").read_text().splitlines() if line.startswith(start))
     place = str(Path(MESHFIX).parent)
     return ["env", f"PATH={place}{os.pathsep}{os.environ['PATH']}", *shlex.split(line.replace("-n 64", "-n 3"))]
 
 
 @pytest.fixture
 def cluster(tmp_path: Path) -> Path:
-    """The folder that the README's commands speak of; mesh 3 is not one."""
+    """The folder that its commands speak of; mesh 3 is not one."""
     meshes = tmp_path / "meshes"
     meshes.mkdir()
     fill(meshes, *(f"{i}.vtk" for i in range(7)))
@@ -471,7 +471,7 @@ def check_cluster(folder: Path, command: list[str]) -> None:
 
 def test_mpi(cluster: Path) -> None:
     pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
-    command = shown("mpiexec")
+    command = shown("mpiexec -n 64")
     if shutil.which("mpiexec", path=command[1].removeprefix("PATH=")) is None:
         pytest.skip("there is no mpiexec")
     check_cluster(cluster, command)

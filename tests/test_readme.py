@@ -1,4 +1,4 @@
-"""Everything the README shows is run, and prints what the README says it prints."""
+"""Everything that the README and the pages in docs/ show is run, and prints what they say it prints."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from meshfix_cli.untangle import STRATEGIES
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TEXT = "\n".join(page.read_text() for page in PAGES)
 
 SECONDS = re.compile(r"\d[\d.,e-]* (s\b|files a second)")
 
 
 def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
 
 
 def commands() -> list[tuple[str, str]]:
@@ -63,7 +65,7 @@ def test_python_example_prints_what_is_shown(folder: Path) -> None:
 
 def test_options_of_commands_for_clusters_exist() -> None:
     commands = re.findall(r"meshfix (\w+) ([^\n]*)", "".join(blocks("sh")))
-    assert {name for name, _ in commands} == {"batch"}
+    assert {name for name, _ in commands} == {"batch", "untangle"}
     for name, arguments in commands:
         known = {option for parameter in main.commands[name].params for option in parameter.opts}
         assert set(re.findall(r"--[a-z-]+", arguments.partition(":::")[0])) <= known
@@ -71,8 +73,14 @@ def test_options_of_commands_for_clusters_exist() -> None:
 
 def test_make_targets_exist() -> None:
     targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    assert set(re.findall(r"make ([a-z]+)", README)) <= targets
+    assert set(re.findall(r"make ([a-z]+)", TEXT)) <= targets
 
 
 def test_every_strategy_is_in_the_table() -> None:
-    assert re.findall(r"^\| `(\w+)` \|", README, re.MULTILINE) == list(STRATEGIES)
+    assert re.findall(r"^\| `(\w+)` \|", (ROOT / "docs/method.md").read_text(), re.MULTILINE) == list(STRATEGIES)
+
+
+def test_links_lead_somewhere() -> None:
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
+            assert target.startswith("https://") or (page.parent / target).exists(), (page.name, target)

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from meshfix_cli.errors import MeshfixError, ReadError
+from meshfix_cli.meshfile import pieces_of
 from meshfix_cli.repair import Files, Held, Judge, Method, repair
 from meshfix_cli.report import Report, to_json
 
@@ -90,10 +91,15 @@ def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> l
     ValueError
         In one sentence: two files to be written are the same, or one is an input.
     """
-    inputs = {os.path.realpath(source): source for source in sources}
     targets = [os.path.join(folder, os.path.basename(source)) for source in sources]  # noqa: PTH118, PTH119
+    pieces = [(source, *pieces_of(source, target)) for source, target in zip(sources, targets, strict=True)]
+    inputs = {os.path.realpath(path): source for source, paths, _ in pieces for path in (source, *paths)}
+    if len(inputs) < len(sources) + sum(len(paths) for _, paths, _ in pieces):
+        raise ValueError(f"{_shared(pieces)} is an input, and a piece of another as well")
+    pairs = [*zip(sources, targets, strict=True), *([(beside, beside)] if beside else [])]
+    pairs += [(source, target) for source, _, made in pieces for target in made]
     written: dict[str, str] = {}
-    for source, target in (*zip(sources, targets, strict=True), *([(beside, beside)] if beside else [])):
+    for source, target in pairs:
         place = os.path.realpath(target)
         if place in inputs:
             raise ValueError(f"{target} would replace the input {inputs[place]}")
@@ -101,6 +107,18 @@ def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> l
             raise ValueError(f"{written[place]} and {source} would both be written to {target}")
         written[place] = source
     return targets
+
+
+def _shared(pieces: Sequence[tuple[str, list[str], list[str]]]) -> str:
+    """Return the first file that stands twice."""
+    seen: set[str] = set()
+    for source, paths, _ in pieces:
+        for path in (source, *paths):
+            place = os.path.realpath(path)
+            if place in seen:
+                return path
+            seen.add(place)
+    raise AssertionError
 
 
 @dataclass(frozen=True)
@@ -159,13 +177,16 @@ def work(task: Task) -> Result:
         return task.result(status, time.perf_counter() - start, facts=to_json(report))
     except (MeshfixError, OSError, MemoryError) as error:
         text = "out of memory" if isinstance(error, MemoryError) else str(error)
+        if isinstance(error, OSError):
+            text = f"{error.filename}: {error.strerror}" if error.filename and error.strerror else text
         return task.result("failed", time.perf_counter() - start, text)
 
 
 def _made_before(task: Task) -> Report | None:
     """Return the report on the output, if that is not older than the input, valid, and all that is asked for."""
     source, target = Path(task.files.source), Path(task.files.target)
-    if not target.is_file() or target.stat().st_mtime_ns < source.stat().st_mtime_ns:
+    paths = [source, *map(Path, pieces_of(str(source), str(target))[0])]
+    if not target.is_file() or target.stat().st_mtime_ns < max(path.stat().st_mtime_ns for path in paths):
         return None
     try:
         document = task.held.read(str(target), task.judge.threads)

@@ -255,7 +255,10 @@ _reporting = _packed(
     _Show,
     *_SHOW,
     click.option(
-        "--threads", type=click.IntRange(1, 1024), default=_cores, help="Default: the cores this process may use."
+        "--threads",
+        type=click.IntRange(1, 1024),
+        default=_cores,
+        help="Default: the cores this process may use; 1 with --mpi.",
     ),
 )
 _STORE = (
@@ -506,13 +509,17 @@ def _processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) ->
 
 def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
     """End all processes with the error of one: the others would wait for it for ever."""
-    if isinstance(error, (MeshfixError, MemoryError, OSError, SystemExit)):
+    code = ERROR
+    if isinstance(error, SystemExit):  # a signal
+        code = error.code if isinstance(error.code, int) else ERROR
+    elif isinstance(error, (MeshfixError, MemoryError, OSError)):
         _complain(f"process {comm.rank}: {str(error) or type(error).__name__}")
     else:
         traceback.print_exception(error)
+    sys.stdout.flush()
     sys.stderr.flush()
-    comm.Abort(ERROR)
-    raise AssertionError
+    comm.Abort(code)
+    os._exit(code)  # Abort may return before the launcher ends this process
 
 
 def _check_other(name: str, *meshes: str) -> None:

@@ -155,25 +155,38 @@ def serve(comm: Intracomm, method: Method, threads: int) -> int:
 
 
 def _put(comm: Intracomm, path: str, size: int, offsets: NDArray[np.int64], values: NDArray[Any]) -> str | None:
-    """Write numbers of `size` bytes at offsets of a file, all processes at once; return what failed."""
+    """Write numbers of `size` bytes at offsets of a file, all processes at once; return what failed in any.
+
+    Nothing else is raised, so that the root can clear up.
+    """
     from mpi4py import MPI
 
-    order = np.argsort(offsets)
-    offsets = offsets[order]
-    first = np.flatnonzero(np.diff(offsets, prepend=-size - 1) != size)  # of those that stand side by side
-    lengths = np.diff(np.append(first, len(offsets))) * size
-    where = MPI.BYTE.Create_hindexed(lengths.tolist(), offsets[first].tolist()).Commit()
     failed = None
+    try:
+        order = np.argsort(offsets)
+        offsets, numbers = offsets[order], values[order].view(np.uint8)
+        first = np.flatnonzero(np.diff(offsets, prepend=-size - 1) != size)  # of those that stand side by side
+        lengths = np.diff(np.append(first, len(offsets))) * size
+        where = MPI.BYTE.Create_hindexed(lengths.tolist(), offsets[first].tolist()).Commit()
+    except Exception as error:
+        failed = f"process {comm.rank}: {str(error) or type(error).__name__}"
+    failed = _first(comm, failed)
+    if failed is not None:
+        return failed
     try:
         file = MPI.File.Open(comm, path, MPI.MODE_WRONLY)
         try:
             file.Set_view(0, MPI.BYTE, where)
-            file.Write_all(values[order].view(np.uint8))
+            file.Write_all(numbers)
         finally:
             file.Close()
     except MPI.Exception as error:
         failed = error.Get_error_string()
     where.Free()
+    return _first(comm, failed)
+
+
+def _first(comm: Intracomm, failed: str | None) -> str | None:
     return next((one for one in comm.allgather(failed) if one is not None), None)
 
 
@@ -291,8 +304,7 @@ class Ranks:
         self.own_vertices = np.arange(len(part.vertices)) < part.own
         self.own_simplices = part.own_simplices
         self.halos = self._halos()
-        self.numbers = comm.gather(part.vertices, ROOT) or []  # in the root; so here
-        self.counts = comm.gather(part.own, ROOT) or []
+        self.numbers = comm.gather(part.vertices, ROOT) or []  # in the root
 
     def total(self, count: int) -> int:
         """Return the sum of a number over all processes."""
@@ -353,8 +365,8 @@ class Ranks:
         if pieces is None:
             return None
         result = np.empty((sum(map(len, pieces)), *values.shape[1:]), dtype=values.dtype)
-        for numbers, count, piece in zip(self.numbers, self.counts, pieces, strict=True):
-            result[numbers[:count]] = piece
+        for numbers, piece in zip(self.numbers, pieces, strict=True):
+            result[numbers[: len(piece)]] = piece
         return result
 
     def record(self) -> RankRecord:
@@ -374,23 +386,24 @@ class Ranks:
         part, size = self.part, self.comm.size
         colours = self.comm.allreduce(int(part.block_colours.max(initial=-1)), op=max) + 1
         asked = self.comm.alltoall([part.vertices[part.own :][part.owners == rank] for rank in range(size)])
-        halos = []
-        for colour in range(colours):
-            blocks = np.flatnonzero(part.block_colours == colour).astype(np.int32)
-            received = {
-                rank: (part.own + np.flatnonzero((part.owners == rank) & (part.colours == colour))).astype(np.int32)
-                for rank in range(size)
-            }
-            sent = {}
-            for rank, numbers in enumerate(asked):
-                here = np.searchsorted(part.vertices[: part.own], numbers).astype(np.int32)
-                sent[rank] = here[part.block_colours[here // _kernels.BLOCK_SIZE] == colour]
-            at_rim = np.zeros(len(part.block_colours), dtype=bool)
-            at_rim[np.concatenate([*sent.values()]) // _kernels.BLOCK_SIZE] = True
-            halos.append(
-                _Halo(_without_empty(sent), _without_empty(received), blocks[at_rim[blocks]], blocks[~at_rim[blocks]])
+        ours = [np.searchsorted(part.vertices[: part.own], numbers).astype(np.int32) for numbers in asked]
+        sent = [_by_colour(rows, part.block_colours[rows // _kernels.BLOCK_SIZE], colours) for rows in ours]
+        theirs = [np.flatnonzero(part.owners == rank).astype(np.int32) for rank in range(size)]
+        received = [_by_colour(part.own + rows, part.colours[rows], colours) for rows in theirs]
+        blocks = _by_colour(np.arange(len(part.block_colours), dtype=np.int32), part.block_colours, colours)
+        at_rim = np.zeros((colours, len(part.block_colours)), dtype=bool)
+        for lists in sent:
+            for colour, rows in enumerate(lists):
+                at_rim[colour, rows // _kernels.BLOCK_SIZE] = True
+        return [
+            _Halo(
+                {rank: lists[colour] for rank, lists in enumerate(sent) if len(lists[colour])},
+                {rank: lists[colour] for rank, lists in enumerate(received) if len(lists[colour])},
+                here[at_rim[colour, here]],
+                here[~at_rim[colour, here]],
             )
-        return halos
+            for colour, here in enumerate(blocks)
+        ]
 
     def _send(self, halo: _Halo, values: NDArray[Any]) -> _Travelling:
         """Start the exchange of rows of values."""
@@ -406,8 +419,10 @@ class Ranks:
         return _Travelling(arriving, leaving)
 
 
-def _without_empty(lists: dict[int, Numbers]) -> dict[int, Numbers]:
-    return {rank: vertices for rank, vertices in lists.items() if len(vertices)}
+def _by_colour(rows: Numbers, colours: Numbers, count: int) -> list[Numbers]:
+    """Return the rows of each colour, in their order."""
+    order = np.argsort(colours, kind="stable")
+    return np.split(rows[order], np.searchsorted(colours[order], np.arange(1, count)))
 
 
 def peak_memory() -> float | None:

@@ -30,7 +30,7 @@ ALLOWED = {
     "dask": {"errors"},
     "distributed": {"_kernels", "errors", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},
     "repair": {"errors", "mesh", "meshfile", "obstacles", "perturb", "quality", "report", "team", "untangle"},
-    "batch": {"errors", "repair", "report"},
+    "batch": {"errors", "meshfile", "repair", "report"},
     "cli": {
         "_kernels",
         "batch",

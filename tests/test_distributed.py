@@ -188,6 +188,57 @@ main(["untangle", "--mpi", "-q", sys.argv[1], sys.argv[1]])
 """
 
 
+@needs_mpi
+def test_a_process_that_fails_before_its_part_is_written_leaves_nothing(tmp_path: Path, bracket: Mesh) -> None:
+    path = tmp_path / "mesh.vtk"
+    write(path, "vtk42", tangle(bracket), "f8", binary=True)
+    original = path.read_bytes()
+    done = mpiexec(2, sys.executable, "-c", NO_ROOM, path, code=1)
+    assert done.stderr == f"meshfix: error: {path}: process 1: MemoryError\n"
+    assert path.read_bytes() == original
+    assert list(tmp_path.iterdir()) == [path]
+
+
+# The command with a process that has no memory to sort what it writes.
+NO_ROOM = """
+import sys
+import meshfix_cli.distributed as distributed
+put = distributed._put
+def argsort(*arguments, **options):
+    raise MemoryError
+def _put(comm, *rest):
+    if comm.rank == 1:
+        distributed.np = type("", (), {"argsort": argsort})
+    return put(comm, *rest)
+distributed._put = _put
+from meshfix_cli.cli import main
+main(["untangle", "--mpi", "-q", sys.argv[1], sys.argv[1]])
+"""
+
+
+@needs_mpi
+def test_a_signal_ends_all_without_a_word(tmp_path: Path) -> None:
+    """Sent to one of the processes in the middle of a sweep, as launchers do to all of them."""
+    done = mpiexec(2, sys.executable, "-c", STOPPED, SAMPLES / "bracket_tangled.vtk", tmp_path / "o.vtk", code=143)
+    assert "Traceback" not in done.stderr
+    assert "meshfix: error" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+STOPPED = f"""
+import os, signal, sys; sys.path.insert(0, {str(Path(__file__).parent)!r})
+from over_ranks import Ranks
+sweep = Ranks.sweep
+def stopped(self, *arguments):
+    if self.comm.rank == 0:
+        signal.raise_signal(signal.SIGTERM)
+    return sweep(self, *arguments)
+Ranks.sweep = stopped
+from meshfix_cli.cli import main
+main(["untangle", "--mpi", "-q", *sys.argv[1:]])
+"""
+
+
 def failing(environment: dict[str, str], *command: str) -> str:
     words = [*command, "untangle", "--mpi", "-q", "--dry-run", str(SAMPLES / "plate_tangled.vtk")]
     environment = {**os.environ, **environment}

@@ -322,16 +322,46 @@ def test_in_place_pieces_keep_their_names_and_backups(tmp_path: Path) -> None:
     assert len(list(tmp_path.rglob("*"))) == 2 * 4 + 1
 
 
-def test_in_another_folder_pieces_keep_their_names(tmp_path: Path) -> None:
+def test_in_another_folder_pieces_have_the_name_of_the_output(tmp_path: Path) -> None:
+    """Else two outputs in one folder might have pieces of the same names."""
     path = made(tmp_path, names="{stem}/{stem}_{i}.vtu")
     before = {one: one.read_bytes() for one in (path, *pieces(path))}
     (tmp_path / "there").mkdir()
     target = tmp_path / "there" / "new.pvtu"
     run("untangle", "-q", path, target)
-    assert target.read_bytes() == path.read_bytes()
-    assert sorted(one.name for one in (tmp_path / "there" / "in").iterdir()) == ["in_0.vtu", "in_1.vtu", "in_2.vtu"]
+    assert target.read_text() == path.read_text().replace("in/in_", "new_")
+    assert {one.name for one in (tmp_path / "there").iterdir()} == {"new.pvtu", *(f"new_{i}.vtu" for i in range(3))}
     assert {one: one.read_bytes() for one in before} == before
     assert read(target).mesh.check()[0] == 0
+
+
+def test_in_a_batch_no_mesh_takes_the_pieces_of_another(tmp_path: Path) -> None:
+    for folder, name in (("a", "one"), ("b", "two")):
+        (tmp_path / folder).mkdir()
+        made(tmp_path / folder, names="p_{i}.vtu").rename(tmp_path / folder / f"{name}.pvtu")
+    run("batch", "-q", "--jobs", 1, tmp_path / "*/*.pvtu", "--output-dir", tmp_path / "out")
+    for name in ("one", "two"):
+        assert len(pieces(tmp_path / "out" / f"{name}.pvtu")) == 3
+        assert read(tmp_path / "out" / f"{name}.pvtu").mesh.check()[0] == 0
+    assert len(list((tmp_path / "out").iterdir())) == 8
+    complaint = run("batch", tmp_path / "a/*vtu", "--output-dir", tmp_path / "new", code=2).stderr
+    assert b"p_0.vtu is an input, and a piece of another as well" in complaint
+    single = tmp_path / "b" / "one_1.vtu"
+    single.write_bytes((tmp_path / "b" / "p_1.vtu").read_bytes())
+    complaint = run("batch", tmp_path / "a/one.pvtu", single, "--output-dir", tmp_path / "new", code=2).stderr
+    assert b"would both be written to" in complaint
+    complaint = run("batch", tmp_path / "a/one.pvtu", "--output-dir", tmp_path / "a", code=2).stderr
+    assert b"would replace the input" in complaint
+
+
+def test_a_batch_is_resumed_where_a_piece_is_newer(tmp_path: Path) -> None:
+    path, words = made(tmp_path), ("batch", "--json", "--jobs", 1, "--resume")
+    for status in ("valid", "skipped"):
+        done = run(*words, path, "--output-dir", tmp_path / "out")
+        assert json.loads(done.stdout)["status"] == status
+    later = (tmp_path / "out" / "in.pvtu").stat().st_mtime_ns + 1_000_000_000
+    os.utime(pieces(path)[1], ns=(later, later))
+    assert json.loads(run(*words, path, "--output-dir", tmp_path / "out").stdout)["status"] == "valid"
 
 
 def test_pieces_outside_of_the_folder_get_names_of_their_own(tmp_path: Path) -> None:

@@ -310,9 +310,9 @@ void receive_py(const Matrix<double>& points, const Vector<std::uint8_t>& states
     for (std::size_t i = 0; i < vertices.shape(0); ++i) {
         double* here = points.data() + static_cast<std::size_t>(vertices(i)) * d;
         const double* there = positions.data() + i * d;
-        if (std::equal(here, here + d, there)) continue;
-        std::copy(there, there + d, here);
-        make_neighbours_due(stars_of(mesh), states.data(), vertices(i));
+        const bool moved = !std::equal(here, here + d, there);
+        std::copy(there, there + d, here);  // also 0 over -0
+        if (moved) make_neighbours_due(stars_of(mesh), states.data(), vertices(i));
     }
 }
 

@@ -34,6 +34,7 @@ __all__ = [
     "check_target",
     "is_stream",
     "output_format",
+    "pieces_of",
     "read",
     "write",
     "write_cells",
@@ -128,7 +129,7 @@ def write(
     form = form or output_format(document, target)
     check_target(target)
     check_pieces(document, target, form)
-    points, source = document.file_points(mesh), document.source
+    points, source, put = document.file_points(mesh), document.source, None if is_stream(target) else put
     stored = document.in_plane(points.astype(np.float64), mesh)
     layout, pieces = (source.layout, source.pieces) if form == document.format else (None, None)
     if pieces is not None:
@@ -237,6 +238,19 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
     if form.binary is None and form.name in formats.BOTH:
         form = Format(form.name, bool(document.format.binary))
     return document.format if form == document.format else _writable(form, target)
+
+
+def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
+    """Return where the pieces of a `.pvtu` are, and where those of an output would be; none of what cannot be read."""
+    if Path(source).suffix.lower() != ".pvtu":
+        return [], []
+    from meshfix_cli.meshfile.pvtu import Index
+
+    try:
+        index = Index.of(Path(source).read_bytes(), Path(source))
+        return [str(path) for path in index.paths], index.targets(target)
+    except (OSError, MeshfixError):
+        return [], []
 
 
 def _writable(form: Format, target: str) -> Format:

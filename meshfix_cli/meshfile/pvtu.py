@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path, PurePath
+from pathlib import Path
 from xml.sax.saxutils import escape
 
 from meshfix_cli.errors import ReadError, WriteError, naming
@@ -93,13 +93,12 @@ class Index:
     def targets(self, target: str) -> list[str]:
         """Return where the pieces of an output go.
 
-        In place they are replaced. In another folder they keep their names; else these are OUTPUT's without its
-        extension, and the number of the piece.
+        In place they are replaced; else their names are OUTPUT's without its extension, and the number of the piece.
         """
         there = Path(target)
         if there.exists() and there.samefile(self.path):
             return [str(path) for path in self.paths]
-        targets = [there.parent / name for name in self._names_beside(there)]
+        targets = [there.parent / name for name in self._names_for(there)]
         mine = {path.resolve() for path in (*self.paths, self.path)}
         for piece in targets:
             if piece.resolve() in mine:
@@ -111,17 +110,13 @@ class Index:
         there = Path(target)
         if there.exists() and there.samefile(self.path):
             return [(target, self.file.data)]
-        names = self._names_beside(there)
+        names = self._names_for(there)
         changed = zip(self.pieces, self.names, names, strict=True)
         edits = [self.file.attribute(piece, "Source", _quoted(new)) for piece, old, new in changed if old != new]
         return [(target, self.file.edited(edits))]
 
-    def _names_beside(self, there: Path) -> list[str]:
-        names = self.names
-        inside = all(not PurePath(name).is_absolute() and ".." not in PurePath(name).parts for name in names)
-        if inside and there.parent.resolve() != self.path.parent.resolve():
-            return names
-        return [f"{there.stem}_{i}.vtu" for i in range(len(names))]
+    def _names_for(self, there: Path) -> list[str]:
+        return [f"{there.stem}_{i}.vtu" for i in range(len(self.pieces))]
 
 
 def _quoted(name: str) -> str:

@@ -28,7 +28,7 @@ from typing import Any
 from meshfix_cli.errors import MeshfixError, ReadError
 from meshfix_cli.meshfile import pieces_of
 from meshfix_cli.repair import Files, Held, Judge, Method, repair
-from meshfix_cli.report import Report, to_json
+from meshfix_cli.report import SCHEMA, Report, to_json
 
 GRACE = 10.0  # seconds that a worker has to clear up once it must end
 
@@ -102,6 +102,7 @@ def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> l
     for source, target in pairs:
         place = os.path.realpath(target)
         if place in inputs:
+            target = f"the report {target}" if source == beside else target
             raise ValueError(f"{target} would replace the input {inputs[place]}")
         if place in written:
             raise ValueError(f"{written[place]} and {source} would both be written to {target}")
@@ -155,7 +156,7 @@ class Task:
     def result(self, status: str, seconds: float, error: str | None = None, facts: Result | None = None) -> Result:
         """Return the facts of `report.to_json`, if there are any, and what became of the file."""
         names = {"command": "batch", "file": self.files.source, "output": self.files.target}
-        return {**(facts or {}), **names, "status": status, "seconds": seconds, "error": error}
+        return {"schema": SCHEMA, **(facts or {}), **names, "status": status, "seconds": seconds, "error": error}
 
 
 def work(task: Task) -> Result:

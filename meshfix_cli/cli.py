@@ -18,7 +18,7 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli import __version__
-from meshfix_cli.errors import MeshfixError
+from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.perturb import Distance
 from meshfix_cli.repair import Files, Held, Judge, Method, repair
 from meshfix_cli.untangle import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
@@ -133,16 +133,26 @@ class _Group(click.Group):
             _fail("out of memory")
         except BrokenPipeError:  # whoever read our output has gone, and Python would flush to it once more
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            sys.exit(ERROR)
+            sys.exit(128 + getattr(signal, "SIGPIPE", 13))
         except OSError as error:
             _fail(str(error))
 
 
 def _stop(number: int, frame: object) -> NoReturn:
-    """Leave through every `finally`; a second signal must not disturb the clearing up."""
+    """End, where there is something to clear up through every `finally`; a second signal must not disturb that.
+
+    Elsewhere at once: in the middle of an import Python may drop an exception.
+    """
     del frame
     signal.signal(number, signal.SIG_IGN)
-    sys.exit(128 + number)
+    atomic = sys.modules.get("meshfix_cli.meshfile.atomic")
+    if _others or (atomic is not None and atomic.under_way):
+        sys.exit(128 + number)
+    os._exit(128 + number)
+
+
+# Processes that work for this one, and end with it.
+_others: set[str] = set()
 
 
 def _complain(message: str) -> None:
@@ -485,7 +495,9 @@ def _processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) ->
     from meshfix_cli.distributed import ROOT, Root, serve
     from meshfix_cli.mpi import world
 
-    comm = world(_launched())
+    with _default_signals():  # the others wait for this process in there, and hear nothing
+        comm = world(_launched())
+    _others.add("mpi")
     if comm.rank != ROOT:
         try:
             code = serve(comm, method, threads)
@@ -505,6 +517,17 @@ def _processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) ->
         raise
     finally:
         root.dismiss(code)
+
+
+@contextmanager
+def _default_signals() -> Iterator[None]:
+    """Let signals end the process where it is."""
+    handlers = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
 
 
 def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
@@ -557,7 +580,6 @@ class _Listed:
     def pairs(self, *, absolute: bool) -> list[tuple[str, str]]:
         """Inputs and outputs, checked before any work."""
         from meshfix_cli.batch import distinct, expanded, named_in, outputs
-        from meshfix_cli.meshfile import check_target
 
         if self.files_from is not None:
             _check_input(self.files_from)
@@ -570,11 +592,20 @@ class _Listed:
             raise click.UsageError(str(error)) from error
         if not pairs:
             raise click.UsageError("there is no IN; name files, or use --files-from")
-        Path(folder).mkdir(parents=True, exist_ok=True)
-        check_target(str(Path(folder) / "mesh"))
+        _make_folder(folder)
         if self.report is not None:
             _check_other(self.report)
         return pairs[self.shard or slice(None)]
+
+
+def _make_folder(folder: str) -> None:
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what = "is not a folder" if Path(folder).exists() else f"cannot be made: {error.strerror}"
+        raise WriteError(f"{folder}: {what}") from error
+    if not os.access(folder, os.W_OK):
+        raise WriteError(f"{folder}: is not writable")
 
 
 @dataclass(frozen=True)
@@ -598,7 +629,9 @@ class _Run:
                 yield pool, jobs
             return
         with self._cluster() as (executor, count):
-            yield executor, self.jobs or 2 * count  # one that is worked on, and one that is on its way
+            if count == 0:
+                click.echo("meshfix: there is no worker yet; waiting for the first", err=True)
+            yield executor, self.jobs or 2 * max(1, count)  # one that is worked on, and one that is on its way
 
     def _cluster(self) -> AbstractContextManager[tuple[Executor | None, int]]:
         if self.scheduler_file is not None:
@@ -607,6 +640,8 @@ class _Run:
             return dask.workers(self.scheduler_file)
         from meshfix_cli import mpi
 
+        with _default_signals():
+            mpi.world(_launched())
         return mpi.workers(_launched())
 
 
@@ -668,6 +703,7 @@ def batch(
     from meshfix_cli.meshfile import write_text
     from meshfix_cli.report import batch_json, kept
 
+    _others.add("workers")
     with where.workers() as (executor, in_flight):
         if executor is None:
             return

@@ -47,7 +47,7 @@ def workers(scheduler_file: str) -> Iterator[tuple[Executor | None, int]]:
     except (OSError, ValueError) as error:
         raise MeshfixError(f"{scheduler_file}: no Dask scheduler answers at {address}: {error}") from error
     with client:  # at its end the scheduler forgets what was not begun
-        yield _Cluster(client), max(1, sum(client.nthreads().values()))
+        yield _Cluster(client), sum(client.nthreads().values())
 
 
 class _Cluster(Executor):

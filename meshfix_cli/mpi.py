@@ -37,9 +37,7 @@ def world(launched: int | None = None) -> Intracomm:
             f"MPI needs mpi4py and an MPI library: pip install 'meshfix-cli[mpi]' mpich, or the cluster's own ({error})"
         ) from error
     except RuntimeError as error:
-        raise MeshfixError(
-            f"mpi4py finds no MPI library: load the cluster's own, or pip install mpich ({error})"
-        ) from error
+        raise MeshfixError("mpi4py finds no MPI library: load the cluster's own, or pip install mpich") from error
     comm = MPI.COMM_WORLD
     if launched is not None and comm.Get_size() < launched:
         raise MeshfixError(

@@ -227,7 +227,7 @@ def test_wrong_usage_is_told_before_any_work(
 def test_nothing_is_done_where_nothing_can_be_written(inputs: Path, tmp_path: Path) -> None:
     fill(inputs, "a.vtk")
     (tmp_path / "file").touch()
-    assert "File exists" in error_line("batch", inputs / "a.vtk", "--output-dir", tmp_path / "file")
+    assert "is not a folder" in error_line("batch", inputs / "a.vtk", "--output-dir", tmp_path / "file")
     arguments = ["batch", inputs / "a.vtk", "--output-dir", tmp_path / "out"]
     assert "does not exist" in error_line(*arguments, "--report", tmp_path / "no" / "r.json")
     assert list((tmp_path / "out").iterdir()) == []

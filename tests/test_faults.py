@@ -168,3 +168,25 @@ def test_a_second_run_changes_no_byte(name: str, tmp_path: Path) -> None:
     done = run("untangle", once, twice)
     assert twice.read_bytes() == once.read_bytes()
     assert b"nothing was moved" in done.stdout
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+def test_a_signal_at_any_time_ends_without_a_word(tmp_path: Path) -> None:
+    """Also while modules are imported, where Python may drop an exception."""
+    for delay in np.linspace(0.02, 0.3, 8).tolist():
+        command = [
+            sys.executable,
+            "-m",
+            "meshfix_cli",
+            "untangle",
+            "-q",
+            SAMPLES / "bracket_tangled.vtk",
+            tmp_path / "o",
+        ]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
+            time.sleep(delay)
+            child.send_signal(signal.SIGTERM)
+            printed, complaint = child.communicate(timeout=30)
+        assert child.returncode in (0, -signal.SIGTERM, 128 + signal.SIGTERM)
+        assert printed + complaint == b""
+        assert {path.name for path in tmp_path.iterdir()} <= {"o"}

@@ -267,6 +267,8 @@ def _open(path: Path | None, double: bool, threads: int) -> tuple[Source, Format
         from meshfix_cli.meshfile.parts import Parts
 
         return _open_pieces(Parts.of(str(path)), double, threads)
+    if path is not None and set("?[") & set(path.name) and not path.exists():
+        raise ReadError("there is no such file; the files of one mesh are named with a *")
     data = _read_bytes(path)
     form = formats.sniff(data) or formats.by_name(Path() if path is None else path)
     if form is None:

@@ -15,6 +15,9 @@ from pathlib import Path
 
 from meshfix_cli.errors import WriteError
 
+# Marks of what is being written: whoever ends the process while there are some must leave through every `finally`.
+under_way: set[object] = set()
+
 
 def check_target(target: str) -> None:
     """Raise WriteError now, before any work, where writing to `target` cannot succeed."""
@@ -42,7 +45,7 @@ def write_file(target: str, produce: Callable[[Path], object], backup: bool = Fa
     streamed = is_stream(target)
     path = Path(target) if streamed else Path(target).resolve()
     parent = Path(tempfile.gettempdir()) if streamed else path.parent
-    with _sentence(target), _folder(parent) as folder:
+    with _under_way(), _sentence(target), _folder(parent) as folder:
         temporary = folder / (path.name if path.suffix else "mesh")
         produce(temporary)
         if target == "-":
@@ -63,7 +66,7 @@ def write_files(contents: Iterable[tuple[str, bytes]], backup: bool = False) -> 
     The folder of a target is made where there is none. With `backup` each file that was there stays as `write_file`
     keeps it.
     """
-    with contextlib.ExitStack() as stack:
+    with _under_way(), contextlib.ExitStack() as stack:
         ready = [_stage(stack, target, data) for target, data in contents]
         for _, path in ready if backup else ():
             with _sentence(str(path)):
@@ -109,6 +112,16 @@ def _sentence(target: str) -> Iterator[None]:
     except OSError as error:
         name = "<stdout>" if target == "-" else target
         raise WriteError(f"{name}: {error.strerror or error}") from error
+
+
+@contextlib.contextmanager
+def _under_way() -> Iterator[None]:
+    mark = object()
+    under_way.add(mark)
+    try:
+        yield
+    finally:
+        under_way.discard(mark)
 
 
 @contextlib.contextmanager

@@ -146,7 +146,7 @@ def _stop(number: int, frame: object) -> NoReturn:
     del frame
     signal.signal(number, signal.SIG_IGN)
     atomic = sys.modules.get("meshfix_cli.meshfile.atomic")
-    if _others or (atomic is not None and atomic.under_way):
+    if _others or getattr(atomic, "under_way", None):
         sys.exit(128 + number)
     os._exit(128 + number)
 

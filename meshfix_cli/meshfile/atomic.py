@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 import shutil
 import stat
 import sys
@@ -127,7 +126,7 @@ def _under_way() -> Iterator[None]:
 @contextlib.contextmanager
 def _folder(parent: Path) -> Iterator[Path]:
     """Make a folder that is gone in the end, also where a signal comes while it is made or removed."""
-    folder = parent / f".meshfix-{secrets.token_hex(8)}"
+    folder = parent / f".meshfix-{os.urandom(8).hex()}"
     try:
         folder.mkdir(0o700)
         yield folder

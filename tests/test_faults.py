@@ -174,15 +174,8 @@ def test_a_second_run_changes_no_byte(name: str, tmp_path: Path) -> None:
 def test_a_signal_at_any_time_ends_without_a_word(tmp_path: Path) -> None:
     """Also while modules are imported, where Python may drop an exception."""
     for delay in np.linspace(0.02, 0.3, 8).tolist():
-        command = [
-            sys.executable,
-            "-m",
-            "meshfix_cli",
-            "untangle",
-            "-q",
-            SAMPLES / "bracket_tangled.vtk",
-            tmp_path / "o",
-        ]
+        words = ["untangle", "-q", SAMPLES / "bracket_tangled.vtk", tmp_path / "o"]
+        command = [sys.executable, "-m", "meshfix_cli", *map(str, words)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as child:
             time.sleep(delay)
             child.send_signal(signal.SIGTERM)

@@ -9,7 +9,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, fields, replace
+from dataclasses import astuple, dataclass, fields, replace
 from functools import partial, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -190,13 +190,10 @@ def _check_input(source: str) -> None:
 
 def _open(files: Files, held: Held, show: _Show, *others: str | None) -> tuple[Document, Format]:
     """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
-    named = [other for other in others if other is not None]
-    for i, other in enumerate(named):
-        _check_other(other, files.source, files.target, *named[:i])
+    _check_others(_given(*others), files.source, files.target)
     _check_input(files.source)
     document, output = files.open(held, show.threads)
-    for other in named:
-        _check_other(other, *document.files)
+    _check_others(_given(*others), *document.files)
     if output.binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
@@ -218,14 +215,51 @@ class _Show:
     quiet: bool
     threads: int = 1
 
-    def judge(self, requirements: tuple[Requirement, ...] = ()) -> Judge:
-        return Judge(self.metrics, requirements, self.threads, brief=self.quiet)
+    def judge(self, draw: _Draw, requirements: tuple[Requirement, ...] = ()) -> Judge:
+        return Judge(self.metrics, requirements, self.threads, brief=self.quiet and not draw.names)
 
     def print(self, report: Report, stream: Any) -> None:
         from meshfix_cli.report import console, print_json, print_report
 
         if not self.quiet:
             (print_json if self.as_json else print_report)(report, console(stream))
+
+
+@dataclass(frozen=True)
+class _Draw:
+    """Files that show the report as a page or as pictures."""
+
+    page: str | None
+    plot: str | None
+
+    @property
+    def names(self) -> list[str]:
+        return _given(*astuple(self))
+
+    def write(self, report: Report, threads: int) -> None:
+        if not self.names:
+            return
+        from meshfix_cli.figures import figures
+        from meshfix_cli.meshfile import write_text
+        from meshfix_cli.page import page
+
+        drawn = figures(report, threads)
+        if self.page is not None:
+            write_text(self.page, page(report, drawn, _options()))
+
+
+def _options() -> dict[str, str]:
+    """The options of the command that runs, with the values they have."""
+    context = click.get_current_context()
+    values = {}
+    for option in context.command.params:
+        value = context.params.get(option.name or "")
+        if not isinstance(option, click.Option) or value is None or value is False or value == ():
+            continue
+        text = " ".join(map(str, value)) if isinstance(value, tuple) else "yes" if value is True else str(value)
+        given = context.get_parameter_source(option.name or "") is not ParameterSource.DEFAULT
+        values[option.opts[0]] = text if given else f"{text} (default)"
+    return values
 
 
 def _packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[..., Any]:
@@ -320,6 +354,12 @@ _solving = _packed(
     click.option("--max-move", type=_Distance(), help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
 )
+_drawing = _packed(
+    "draw",
+    _Draw,
+    click.option("--report", "page", metavar="FILE.html", help="Write the report as a page with pictures."),
+    click.option("--plot", metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
+)
 _cells = click.option("--cells", metavar="FILE", help="Write a .vtu or .vtk with the quality of each element.")
 _allow = click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
 _require = click.option(
@@ -372,6 +412,7 @@ def main() -> None:
 @_solving
 @click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
 @_cells
+@_drawing
 @_allow
 @click.option("--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes.")
 @click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
@@ -385,6 +426,7 @@ def untangle(
     method: Method,
     history: str | None,
     cells: str | None,
+    draw: _Draw,
     allow_inverted: bool,
     verbose: bool,
     mpi: bool,
@@ -409,17 +451,18 @@ def untangle(
     with _processes(method, show.threads, watch) if mpi else nullcontext() as root:
         if root and files.source == "-":
             raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
-        document, output = _open(files, held, show, history, cells)
+        document, output = _open(files, held, show, history, cells, *draw.names)
         if cells is not None:
             check_cells(document, cells)
         solve, put = (
             (root.solve, root.put) if root else (partial(method.solve, threads=show.threads, watch=watch), None)
         )
-        report = repair(document, output, files, method, show.judge(requirements), solve, put)
+        report = repair(document, output, files, method, show.judge(draw, requirements), solve, put)
         if history is not None:
             write_text(history, history_csv(report.records))
         if cells is not None:
             _write_cells(document, report.mesh, cells, show.threads)
+        draw.write(report, show.threads)
         show.print(report, _report_stream(files))
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
@@ -429,9 +472,10 @@ def untangle(
 @click.option("--percent", type=_Range(0, 100), required=True, help="Of all vertices; interior ones move.")
 @click.option("--dist", type=_Distance(), required=True, help="2h: two mean edge lengths; 0.3: model units.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@_drawing
 @_holding
 @_reporting
-def perturb(files: Files, held: Held, show: _Show, percent: float, dist: Distance, seed: int) -> None:
+def perturb(files: Files, held: Held, show: _Show, draw: _Draw, percent: float, dist: Distance, seed: int) -> None:
     """Tangle a mesh as the paper does: move some interior vertices by a distance in random directions.
 
     With one seed, the same vertices move in the same directions whatever --percent and --dist are. Exits with 0
@@ -439,18 +483,21 @@ def perturb(files: Files, held: Held, show: _Show, percent: float, dist: Distanc
     """
     from meshfix_cli.perturb import perturb as tangle
 
-    document, output = _open(files, held, show)
+    document, output = _open(files, held, show, *draw.names)
     length = dist.length(document.mesh, show.threads)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
     result, notes = files.write(document, perturbed, output)
     facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}
     stages = {"before": document.mesh, "perturbed": result}
-    show.print(show.judge().report("perturb", document, stages, notes, facts=facts), _report_stream(files))
+    report = show.judge(draw).report("perturb", document, stages, notes, facts=facts)
+    draw.write(report, show.threads)
+    show.print(report, _report_stream(files))
 
 
 @main.command()
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True, type=_FILE)
 @_cells
+@_drawing
 @click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
 @_require
 @_holding
@@ -458,6 +505,7 @@ def perturb(files: Files, held: Held, show: _Show, percent: float, dist: Distanc
 def quality(
     sources: tuple[str, ...],
     cells: str | None,
+    draw: _Draw,
     everything: bool,
     requirements: tuple[Requirement, ...],
     held: Held,
@@ -468,18 +516,21 @@ def quality(
     A CONDITION compares a number of the JSON report (inverted, folded, min_measure, min_angle, max_angle,
     mean_min_angle, percentile_1), or the worst value of a --metric, by >=, <=, >, < or ==.
     """
-    if cells is not None and len(sources) > 1:
-        raise click.UsageError("--cells takes one INPUT")
+    beside = _given(cells, *draw.names)
+    if beside and len(sources) > 1:
+        raise click.UsageError("--cells, --report and --plot take one INPUT")
     codes = set()
     for source in sources:
         try:
             _check_input(source)
+            _check_others(beside, source)
             document = held.read(source, show.threads)
+            _check_others(beside, *document.files)
             if cells is not None:
-                _check_other(cells, source, *document.files)
                 _write_cells(document, document.mesh, cells, show.threads)
             stages = {"mesh": document.mesh}
-            report = show.judge(requirements).report("quality", document, stages, everything=everything)
+            report = show.judge(draw, requirements).report("quality", document, stages, everything=everything)
+            draw.write(report, show.threads)
         except MeshfixError as error:
             _complain(str(error))
             codes.add(ERROR)
@@ -543,6 +594,15 @@ def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
     sys.stderr.flush()
     comm.Abort(code)
     os._exit(code)  # Abort may return before the launcher ends this process
+
+
+def _given(*names: str | None) -> list[str]:
+    return [name for name in names if name is not None]
+
+
+def _check_others(names: list[str], *meshes: str) -> None:
+    for i, name in enumerate(names):
+        _check_other(name, *meshes, *names[:i])
 
 
 def _check_other(name: str, *meshes: str) -> None:

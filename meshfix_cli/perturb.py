@@ -26,6 +26,9 @@ class Distance:
             raise ValueError(text)
         return cls(value, in_h)
 
+    def __str__(self) -> str:
+        return f"{self.value:g}{'h' * self.in_h}"
+
     def length(self, mesh: Mesh, threads: int = 1) -> float:
         """Return the length in model units of a mesh."""
         return self.value * (mesh.mean_edge_length(threads) if self.in_h else 1.0)

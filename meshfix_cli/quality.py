@@ -171,6 +171,21 @@ def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
     return {"measure": measure, "min_angle": np.degrees(smallest), "inverted": wrong.astype(np.int32)}
 
 
+def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: int = 1) -> NDArray[np.int64]:
+    """Return the rows (at most count,) of the worst simplices: inverted ones, then those of the smallest angles.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    inverted : (k,) int32
+        Rows of the inverted simplices, as in `Summary.inverted_elements`.
+    count, threads : int
+    """
+    badness = -_kernels.angles(mesh.points, mesh.topology.simplices, threads)[0]
+    badness[inverted] += 2 * math.pi
+    return np.argsort(-badness, kind="stable")[:count]
+
+
 def distances(before: Mesh, after: Mesh) -> Array:
     """Return how far each vertex moved (n,), in model units; 0 for points that belong to no element."""
     used = before.topology.used

@@ -158,7 +158,7 @@ class Judge:
         return Report(
             name=document.name,
             command=command,
-            mesh=result,
+            meshes=dict(stages),
             points=partial(document.file_points, result),
             ids=document.ids,
             stages={stage: summarise(stages[stage], metrics, self.threads) for stage in shown},

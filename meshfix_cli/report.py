@@ -41,14 +41,15 @@ class Report:
     Attributes
     ----------
     name, command : str
-    mesh : Mesh
-        The result, as the file stores it.
+    meshes : dict
+        By the names of the stages; the last is the result, as the file stores it.
     points : callable
         Gives the result (n, 2) or (n, 3) float in the coordinates of the file.
     ids : (m,) int64
         The file's numbers of the simplices.
     stages : dict
-        Summaries by name in the order of the table's columns; the last is that of the result.
+        Summaries by name in the order of the table's columns; the last is that of the result. A brief report has no
+        others.
     ceiling : float or None
         Degrees; the smallest angle that fixed vertices set.
     obstacles : Obstacles
@@ -67,7 +68,7 @@ class Report:
 
     name: str
     command: str
-    mesh: Mesh
+    meshes: Mapping[str, Mesh]
     points: Callable[[], NDArray[np.floating[Any]]]
     ids: NDArray[np.int64]
     stages: dict[str, Summary]
@@ -79,6 +80,11 @@ class Report:
     facts: Mapping[str, Any] | None = None
     requirements: Sequence[Requirement] = ()
     everything: bool = False
+
+    @property
+    def mesh(self) -> Mesh:
+        """The result."""
+        return list(self.meshes.values())[-1]
 
     @property
     def result(self) -> Summary:
@@ -119,22 +125,19 @@ def print_report(report: Report, out: Console) -> None:
     def line(text: str, style: str = "") -> None:
         out.print(Text(text, style=style), soft_wrap=True)
 
-    line(_title(report))
+    line(title(report))
     out.print(_quality_table(report))
     if report.records:
-        for text in _phases(report):
+        for text in phases(report):
             line(text)
     for rank, facts in enumerate((report.facts or {}).get("ranks", ())):
         line(_process(rank, facts))
     for note in report.notes:
         line(f"note: {note}")
-    for text in _verdict(report):
+    for text in verdict(report):
         line(text, "bold green" if report.valid else "bold red")
-    for one in report.requirements:
-        met = one.holds(report.result)
-        line(
-            f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g})", "green" if met else "bold red"
-        )
+    for met, text in required(report):
+        line(text, "green" if met else "bold red")
 
 
 def print_json(report: Report, out: Console) -> None:
@@ -333,7 +336,8 @@ def _finite(value: float) -> float | None:
     return value if abs(value) < float("inf") else None
 
 
-def _title(report: Report) -> str:
+def title(report: Report) -> str:
+    """Return what the mesh is, in one line."""
     mesh = report.mesh
     cells, held = CELL_NAMES[mesh.dimension][1], ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
     vertices, free = int(mesh.topology.used.sum()), int(mesh.movable.sum())
@@ -342,31 +346,40 @@ def _title(report: Report) -> str:
     )
 
 
-def _quality_table(report: Report) -> Table:
-    mesh, stages = report.mesh, report.stages
-    angle = "angle" if mesh.dimension == 2 else "dihedral angle"
-    table = Table("")
-    for stage in stages:
-        table.add_column(stage, justify="right")
+def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
+    """Return the rows of the quality table: a label, and the value of each stage."""
+    flat, stages = report.mesh.dimension == 2, list(report.stages.values())
+    angle = "angle" if flat else "dihedral angle"
 
-    def row(label: str, form: str, field: str) -> None:
-        table.add_row(label, *(format(getattr(summary, field), form) for summary in stages.values()))
+    def row(label: str, form: str, field: str) -> tuple[str, list[str]]:
+        return label, [format(getattr(summary, field), form) for summary in stages]
 
-    row("inverted elements", ",", "inverted")
-    row("folded interior faces" if mesh.dimension == 3 else "folded interior edges", ",", "folded")
-    row(f"smallest {MEASURE_NAMES[mesh.dimension]}", ".3g", "min_measure")
-    row(f"smallest {angle} [°]", ".3f", "min_angle")
-    row(f"largest {angle} [°]", ".3f", "max_angle")
-    row(f"mean smallest {angle} [°]", ".2f", "mean_min_angle")
-    row("1st percentile [°]", ".2f", "percentile_1")
+    rows = [
+        row("inverted elements", ",", "inverted"),
+        row("folded interior edges" if flat else "folded interior faces", ",", "folded"),
+        row(f"smallest {MEASURE_NAMES[report.mesh.dimension]}", ".3g", "min_measure"),
+        row(f"smallest {angle} [°]", ".3f", "min_angle"),
+        row(f"largest {angle} [°]", ".3f", "max_angle"),
+        row(f"mean smallest {angle} [°]", ".2f", "mean_min_angle"),
+        row("1st percentile [°]", ".2f", "percentile_1"),
+    ]
     if report.ceiling is not None:
-        blank = [""] * (len(stages) - 1)
-        table.add_row("ceiling set by fixed vertices [°]", *blank, f"{report.ceiling:.3f}")
+        rows.append(("ceiling set by fixed vertices [°]", [""] * (len(stages) - 1) + [f"{report.ceiling:.3f}"]))
     for name in report.result.metrics:
-        worst = [f"{summary.metrics[name][0]:.3g} / {summary.metrics[name][1]:.3g}" for summary in stages.values()]
-        table.add_row(f"{name}, worst / mean", *worst)
+        worst = [f"{summary.metrics[name][0]:.3g} / {summary.metrics[name][1]:.3g}" for summary in stages]
+        rows.append((f"{name}, worst / mean", worst))
+    return rows
+
+
+def _quality_table(report: Report) -> Table:
+    table = Table("")
+    for stage in report.stages:
+        table.add_column(stage, justify="right")
+    for label, values in quality_rows(report):
+        table.add_row(label, *values)
+    bars = (_bars(summary.histogram) for summary in report.stages.values())
     width = len(report.result.histogram) * BIN_WIDTH
-    table.add_row(f"smallest angles, 0 to {width:.0f}°", *(_bars(summary.histogram) for summary in stages.values()))
+    table.add_row(f"smallest angles, 0 to {width:.0f}°", *bars)
     return table
 
 
@@ -376,13 +389,13 @@ def _bars(histogram: Sequence[int]) -> str:
     return "".join(_BARS[-(-count * (len(_BARS) - 1) // top)] for count in histogram)
 
 
-def _phases(report: Report) -> Iterator[str]:
-    """A line for each phase: its sweeps, what is left after the last, and seconds."""
-    phases: dict[str, list[SweepRecord]] = {}
+def phases(report: Report) -> Iterator[str]:
+    """Give a line for each phase: its sweeps, what is left after the last, and seconds."""
+    by_name: dict[str, list[SweepRecord]] = {}
     for record in report.records:
         if record.sweep and record.phase != "best":
-            phases.setdefault(record.phase, []).append(record)
-    for name, records in phases.items():
+            by_name.setdefault(record.phase, []).append(record)
+    for name, records in by_name.items():
         left, sweeps, seconds = records[-1], len(records), sum(record.seconds for record in records)
         measure = f"smallest {MEASURE_NAMES[report.mesh.dimension]} {left.min_measure:.3g}"
         yield f"{name}: {sweeps} sweep{'s' * (sweeps > 1)}, {left.inverted:,} inverted, {measure}, {seconds:.3g} s"
@@ -394,7 +407,8 @@ def _process(rank: int, facts: Mapping[str, Any]) -> str:
     return f"process {rank}: {held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
 
 
-def _verdict(report: Report) -> list[str]:
+def verdict(report: Report) -> list[str]:
+    """Return in plain words how far vertices moved, and whether the mesh is valid; if not, which elements are wrong."""
     facts = report.facts or {}
     lines = [_perturbed(facts)] if "moved" in facts else [_displaced(facts)] if "displacement" in facts else []
     count = report.result.inverted
@@ -428,6 +442,13 @@ def _impossible(report: Report) -> Iterator[str]:
         which = ", ".join(f"{a} and {b}" for a, b in crossing[some].tolist())
         what = "place" if len(crossing) == 1 else "places"
         yield f"IMPOSSIBLE: the fixed boundary crosses itself in {len(crossing):,} {what} (elements {which}{more})"
+
+
+def required(report: Report) -> Iterator[tuple[bool, str]]:
+    """Yield for each requirement whether it is met, and the same in words."""
+    for one in report.requirements:
+        met = one.holds(report.result)
+        yield met, f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g})"
 
 
 def _displaced(facts: Mapping[str, Any]) -> str:

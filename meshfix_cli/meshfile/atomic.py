@@ -137,8 +137,9 @@ def _folder(parent: Path) -> Iterator[Path]:
 
 
 def write_text(target: str, text: str) -> None:
-    """Write a small file as `write_file` does."""
-    write_file(target, lambda temporary: temporary.write_text(text))
+    """Write text as `write_file` does, in UTF-8."""
+    # Names of files may hold bytes that are no text.
+    write_file(target, lambda temporary: temporary.write_text(text, encoding="utf-8", errors="replace"))
 
 
 def _complete(temporary: Path, path: Path) -> None:

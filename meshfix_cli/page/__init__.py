@@ -1,0 +1,265 @@
+"""The report as one HTML file: tables, charts, and a picture that can be turned; it needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import json
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path, PurePath
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.figures import Figures, Scene, Worst
+from meshfix_cli.mesh import CELL_NAMES
+from meshfix_cli.page import charts
+from meshfix_cli.quality import BIN_WIDTH
+from meshfix_cli.report import Report, phases, quality_rows, required, title, to_json, verdict
+
+FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
+PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")
+
+Numbers = NDArray[np.float64]
+
+
+def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
+    """Return the HTML.
+
+    Parameters
+    ----------
+    report : Report
+        With all stages.
+    drawn : Figures
+        Of that report.
+    options : mapping
+        Those of the command line and their values.
+    """
+    skeleton, style, script = (
+        (Path(__file__).parent / name).read_text(encoding="utf-8")
+        for name in ("skeleton.html", "style.css", "viewer.js")
+    )
+    return Template(skeleton).substitute(
+        style=style,
+        script=script,
+        style_hash=_hash(style),
+        script_hash=_hash(script),
+        heading=escape(PurePath(report.name).name or report.name),
+        command=escape(report.command),
+        subject=escape(title(report)),
+        outcome="valid" if report.valid else "wrong",
+        verdict=_verdict(report),
+        lead=_lead(report),
+        picture=escape(_in_words(report, drawn.scene)),
+        stages=_stages(report, drawn.scene),
+        legend=_legend(drawn.scene),
+        keys=_keys(drawn.scene.dimension),
+        quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)),
+        requirements=_requirements(report),
+        and_convergence=" and convergence" if drawn.convergence else "",
+        charts=_charts(report, drawn),
+        worst=_worst(report, drawn),
+        made=_made(report, options),
+        report=_json(to_json(replace(report, everything=False))),
+        scene=_json(_scene(drawn.scene)),
+    )
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{base64.b64encode(sha256(text.encode()).digest()).decode()}"
+
+
+def _json(value: object) -> str:
+    """Return JSON that cannot end the script element it stands in."""
+    return json.dumps(value, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _table(caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Sequence[str]]], style: str = "") -> str:
+    """Return a table of text; it scrolls by itself where the page is narrower."""
+    first, *others = (escape(column) for column in columns)
+    corner = f'<th scope="col">{first}</th>' if first else "<td></td>"
+    head = corner + "".join(f'<th scope="col">{column}</th>' for column in others)
+    body = "".join(
+        f'<tr><th scope="row">{escape(name)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in cells)}</tr>'
+        for name, cells in rows
+    )
+    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", style)
+
+
+def _scrolled(caption: str, content: str, style: str = "") -> str:
+    return (
+        f'<div class="wide" role="region" tabindex="0" aria-label="{escape(caption)}">'
+        f'<table class="{style}"><caption>{escape(caption)}</caption>{content}</table></div>'
+    )
+
+
+def _verdict(report: Report) -> str:
+    word = "Valid" if report.valid else "Not valid"
+    lines = [*verdict(replace(report, everything=False)), *(f"note: {note}" for note in report.notes)]
+    return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{escape(line)}</p>" for line in lines)
+
+
+def _lead(report: Report) -> str:
+    """Return the numbers that matter most, of the result and of the mesh as it came."""
+    boxes = ""
+    for name, values in quality_rows(report)[:4]:
+        was = f' <span class="was">from {escape(values[0])}</span>' if len(values) > 1 else ""
+        boxes += f"<div><dt>{escape(name)}</dt><dd>{escape(values[-1])}{was}</dd></div>"
+    return f'<dl class="lead">{boxes}</dl>'
+
+
+def _in_words(report: Report, scene: Scene) -> str:
+    counts = ", ".join(f"{summary.inverted:,} inverted {stage}" for stage, summary in report.stages.items())
+    what = "Plane view" if scene.dimension == 2 else "Three-dimensional view"
+    return f"{what} of the mesh and its {CELL_NAMES[scene.dimension][1]}: {counts}"
+
+
+def _stages(report: Report, scene: Scene) -> str:
+    radios = ""
+    for i, (name, state) in enumerate(scene.states.items()):
+        count, shown = report.stages[name].inverted, len(state.inverted)
+        words = f"{name}: {count:,} inverted element{'s' * (count != 1)}"
+        if state.left_out:
+            words += f", of which {shown:,} are drawn"
+        radios += (
+            f'<label><input type="radio" name="stage" value="{i}" data-drawn="{escape(words)}"'
+            f"{' checked' * (i == 0)}>{escape(name)}</label>"
+        )
+    return radios
+
+
+def _legend(scene: Scene) -> str:
+    boundary = "boundary, drawn coarsely" if scene.coarse else "boundary"
+    if scene.dimension == 2 and any(len(state.cells) for state in scene.states.values()):
+        boundary = "all elements"
+    count = len(list(scene.states.values())[-1].worst)
+    items = {"inverted": "inverted elements", "worst": f"the worst {count} of the result", "boundary": boundary}
+    return "\n".join(f'<li><i class="{style}"></i>{words}</li>' for style, words in items.items())
+
+
+def _keys(dimension: int) -> str:
+    if dimension == 2:
+        return "Drag to move, wheel or pinch to zoom. Keys: arrows move, + and − zoom, 0 resets."
+    return (
+        "Drag to turn, wheel or pinch to zoom, drag with Shift or two fingers to move. "
+        "Keys: arrows turn, + and − zoom, 0 resets."
+    )
+
+
+def _requirements(report: Report) -> str:
+    style = {True: "met", False: "unmet"}
+    items = "".join(f'<li class="{style[met]}">{escape(text)}</li>' for met, text in required(report))
+    return f'<ul class="plain">{items}</ul>' if items else ""
+
+
+def _charts(report: Report, drawn: Figures) -> str:
+    angle, measure = ("angle", "area") if report.mesh.dimension == 2 else ("dihedral angle", "volume")
+    bins = len(report.result.histogram)
+    counts = [
+        (f"{i * BIN_WIDTH:.0f}–{(i + 1) * BIN_WIDTH:.0f}°", [f"{one[i]:,}" for one in drawn.histograms.values()])
+        for i in range(bins)
+    ]
+    numbers = _table("Elements by their smallest angle", ["smallest angle", *drawn.histograms], counts)
+    result = _figure(f"Elements by their smallest {angle}", charts.histogram(drawn.histograms, angle), numbers)
+    if drawn.convergence is None:
+        return result
+    result += _figure("Inverted elements, logarithmic", charts.inverted(drawn.convergence), _sweeps(report, measure))
+    return result + _figure(f"Size of the smallest {measure}, logarithmic", charts.measures(drawn.convergence, measure))
+
+
+def _figure(caption: str, svg: str, numbers: str = "") -> str:
+    details = f"<details><summary>The numbers</summary>{numbers}</details>" if numbers else ""
+    return f"<figure><figcaption>{escape(caption)}</figcaption>{svg}{details}</figure>\n"
+
+
+def _sweeps(report: Report, measure: str) -> str:
+    rows = [
+        (str(i), [one.phase, f"{one.inverted:,}", f"{one.min_measure:.3g}", f"{one.moved:,}", f"{one.seconds:.3g}"])
+        for i, one in enumerate(report.records)
+    ]
+    columns = ["sweep", "phase", "inverted", f"smallest {measure}", "moved", "seconds"]
+    return _table("Every sweep", columns, rows)
+
+
+def _worst(report: Report, drawn: Figures) -> str:
+    angle, measure = ("angle", "area") if report.mesh.dimension == 2 else ("dihedral angle", "volume")
+    columns = ["element", f"smallest {angle} [°]", measure, "inverted", "centroid", "picture"]
+    head = "".join(f'<th scope="col">{column}</th>' for column in columns)
+    body = "".join(_worst_row(one, drawn.scene) for one in drawn.worst)
+    caption = f"The {len(drawn.worst)} worst elements of the result, as the file numbers them"
+    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>")
+
+
+def _worst_row(one: Worst, scene: Scene) -> str:
+    corners = _placed(one.corners, scene).astype(float)
+    reach = np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()
+    place = [*corners.mean(axis=0), *[0.0] * (3 - scene.dimension), max(float(reach), 1e-6)]
+    cells = f"<td>{one.angle:.3f}</td><td>{one.measure:.3g}</td>"
+    cells += '<td class="inverted">yes</td>' if one.inverted else "<td>no</td>"
+    cells += f"<td class='place'>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
+    button = f'<button type="button" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
+    return (
+        f'<tr><th scope="row">{one.id}</th>{cells}<td>{button} aria-label="Show element {one.id}">Show</button></td></tr>'
+    )
+
+
+def _made(report: Report, options: Mapping[str, str]) -> str:
+    lines = [("file", [report.name]), *((name, [value]) for name, value in options.items())]
+    if report.records:
+        lines.append(("sweeps", ["; ".join(phases(report))]))
+    for package in PACKAGES:
+        lines.append((package, [_version(package)]))
+    lines.append(("Python", [f"{platform.python_version()}, {platform.system()} {platform.machine()}"]))
+    return _table("Options and versions", ["", "value"], lines, "words")
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed as a package"
+
+
+def _placed(points: Numbers, scene: Scene) -> NDArray[np.float32]:
+    """Return points (k, d) relative to the middle of the mesh and its size."""
+    middle, extent = scene.frame
+    return np.clip((points - middle) / np.linalg.norm(extent), -FARTHEST, FARTHEST).astype(np.float32)
+
+
+def _scene(scene: Scene) -> dict[str, Any]:
+    """Return what the page's script draws: `points` as base64 of float32, `rows` of uint16, or of uint32 where wide."""
+    points = [scene.boundary, *(state.points for state in scene.states.values())]
+    layers = [_layer("boundary", scene.facets, 0), _layer("creases", scene.creases, 0)]
+    for stage, state in enumerate(scene.states.values()):
+        roles = {"cells": state.cells, "inverted": state.inverted, "worst": state.worst}
+        layers += [_layer(role, rows, stage + 1, stage) for role, rows in roles.items()]
+    extent = scene.frame[1]
+    return {
+        "dimension": scene.dimension,
+        "extent": (extent / np.linalg.norm(extent)).tolist(),
+        "points": [_base64(_placed(one, scene)) for one in points],
+        "layers": [layer for layer in layers if layer["rows"]],
+    }
+
+
+def _layer(role: str, rows: NDArray[np.int32], points: int, stage: int | None = None) -> dict[str, Any]:
+    wide = bool(rows.max(initial=0) >= 2**16)
+    packed = rows.astype(np.uint32 if wide else np.uint16)
+    return {
+        "role": role,
+        "corners": rows.shape[1],
+        "points": points,
+        "stage": stage,
+        "wide": wide,
+        "rows": _base64(packed),
+    }
+
+
+def _base64(values: NDArray[Any]) -> str:
+    return base64.b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode()

@@ -236,16 +236,27 @@ class _Draw:
     def names(self) -> list[str]:
         return _given(*astuple(self))
 
+    def check(self) -> None:
+        if self.plot is not None:
+            from meshfix_cli.plot import check_plot
+
+            check_plot(self.plot)
+
     def write(self, report: Report, threads: int) -> None:
         if not self.names:
             return
         from meshfix_cli.figures import figures
-        from meshfix_cli.meshfile import write_text
-        from meshfix_cli.page import page
+        from meshfix_cli.meshfile import write_file, write_text
 
         drawn = figures(report, threads)
         if self.page is not None:
+            from meshfix_cli.page import page
+
             write_text(self.page, page(report, drawn, _options()))
+        if self.plot is not None:
+            from meshfix_cli.plot import plot
+
+            write_file(self.plot, partial(plot, report, drawn))
 
 
 def _options() -> dict[str, str]:
@@ -451,6 +462,7 @@ def untangle(
     with _processes(method, show.threads, watch) if mpi else nullcontext() as root:
         if root and files.source == "-":
             raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
+        draw.check()
         document, output = _open(files, held, show, history, cells, *draw.names)
         if cells is not None:
             check_cells(document, cells)
@@ -483,6 +495,7 @@ def perturb(files: Files, held: Held, show: _Show, draw: _Draw, percent: float, 
     """
     from meshfix_cli.perturb import perturb as tangle
 
+    draw.check()
     document, output = _open(files, held, show, *draw.names)
     length = dist.length(document.mesh, show.threads)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
@@ -519,6 +532,7 @@ def quality(
     beside = _given(cells, *draw.names)
     if beside and len(sources) > 1:
         raise click.UsageError("--cells, --report and --plot take one INPUT")
+    draw.check()
     codes = set()
     for source in sources:
         try:

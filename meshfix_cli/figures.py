@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,10 @@ from meshfix_cli.untangle import SMOOTHING, SweepRecord
 
 WORST = 10  # elements of the result that are named and marked
 MOST_CELLS = 100_000  # triangles of a plane mesh that are all drawn
-MOST_INVERTED = 50_000  # inverted elements that are drawn of each stage
+MOST_INVERTED = 20_000  # inverted elements that are drawn of each stage
 MOST_FACETS = 150_000  # of the boundary; above it is drawn on a grid, which has so many cells along its longest side:
 GRID = 512
+THINNEST = 1e-3  # extent of a picture, relative to the largest
 CREASE = 30.0  # degrees between two facets of the boundary, above which their edge is drawn
 
 # The facets of a positive simplex, seen from outside.
@@ -80,10 +83,11 @@ class Scene:
 
     @property
     def frame(self) -> tuple[Points, Points]:
-        """The middle (d,) of the mesh and half its extent (d,), which is what pictures show at first."""
+        """The middle (d,) of the mesh and half its extent (d,), never 0, which is what pictures show at first."""
         points = self.boundary if len(self.boundary) else next(iter(self.states.values())).points
         low, high = points.min(axis=0), points.max(axis=0)
-        return low + (high - low) / 2, (high - low) / 2
+        half = (high - low) / 2
+        return low + half, np.maximum(half, THINNEST * (half.max() or 1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,12 +172,12 @@ def convergence(records: Sequence[SweepRecord]) -> Convergence:
     )
 
 
-def scene(meshes: dict[str, Mesh], stages: dict[str, Summary], worst: NDArray[np.int64]) -> Scene:
+def scene(meshes: Mapping[str, Mesh], stages: Mapping[str, Summary], worst: NDArray[np.int64]) -> Scene:
     """Return the picture of the stages of a mesh; `worst` are rows of its simplices."""
     result, mesh = list(meshes.items())[-1]
     boundary, facets, coarse = _coarser(*_boundary(mesh))
     whole = mesh.dimension == 2 and mesh.topology.m <= MOST_CELLS
-    drawn = _whole_state if whole else _partial_state
+    drawn = partial(_whole_state, mesh.topology.number[mesh.topology.simplices]) if whole else _partial_state
     return Scene(
         boundary=boundary,
         facets=facets,
@@ -204,20 +208,19 @@ def _worst(report: Report, rows: NDArray[np.int64]) -> list[Worst]:
     ]
 
 
-def _whole_state(mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
-    cells = mesh.topology.number[mesh.topology.simplices]
+def _whole_state(cells: Rows, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
     return State(mesh.along_curve(mesh.points), cells, cells[inverted], cells[worst], left_out=0)
 
 
 def _partial_state(mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
-    # Every so many-th, so that what is left out is left out everywhere.
-    some = inverted[:: -(-len(inverted) // MOST_INVERTED) or 1]
+    # Spread, so that what is left out is left out everywhere.
+    some = inverted[np.linspace(0, len(inverted) - 1, min(len(inverted), MOST_INVERTED)).astype(np.int64)]
     points, cells = _compact(mesh.points, mesh.topology.simplices[np.concatenate([some, worst])])
     none = np.empty((0, mesh.dimension + 1), dtype=np.int32)
     return State(points, none, cells[: len(some)], cells[len(some) :], left_out=len(inverted) - len(some))
 
 
-def _compact(points: Points, rows: NDArray[np.integer]) -> tuple[Points, Rows]:
+def _compact(points: Points, rows: NDArray[np.integer[Any]]) -> tuple[Points, Rows]:
     """Return the points that rows (m, c) name, and the rows with the numbers that these have then."""
     used, numbers = np.unique(rows, return_inverse=True)
     return points[used], numbers.reshape(rows.shape).astype(np.int32)
@@ -235,16 +238,22 @@ def _boundary(mesh: Mesh) -> tuple[Points, Rows]:
 
 def _coarser(points: Points, facets: Rows) -> tuple[Points, Rows, bool]:
     """Join the vertices in each cell of a grid, as coarse as it takes for `MOST_FACETS`; True: it was needed."""
-    size, cells, merged = np.ptp(points, axis=0).max(initial=0.0), GRID, facets
+    low, size, cells = points.min(axis=0), np.ptp(points, axis=0).max() or 1.0, GRID
+    merged: NDArray[np.integer[Any]] = facets
     while len(merged) > MOST_FACETS:
-        places = np.floor((points - points.min(axis=0)) / size * cells)
-        _, first, numbers = np.unique(places, axis=0, return_index=True, return_inverse=True)
-        merged = first[numbers.reshape(-1)][facets]
-        ordered = np.sort(merged, axis=1)
-        _, once = np.unique(ordered, axis=0, return_index=True)
-        merged = merged[once[(np.diff(ordered[once], axis=1) > 0).all(axis=1)]]
+        places = np.floor((points - low) / size * cells).astype(np.int64)
+        _, first, numbers = np.unique(_keys(places, cells + 1), return_index=True, return_inverse=True)
+        joined = numbers.reshape(-1)[facets]
+        ordered = np.sort(joined, axis=1)
+        _, once = np.unique(_keys(ordered, len(first)), return_index=True)
+        merged = first[joined[once[(np.diff(ordered[once], axis=1) > 0).all(axis=1)]]]
         cells = cells * 2 // 3
     return (*_compact(points, merged), merged is not facets)
+
+
+def _keys(rows: NDArray[np.int64], base: int) -> NDArray[np.int64]:
+    """Return one number (m,) for each row (m, c) of numbers below `base`, which is at most two million."""
+    return rows @ base ** np.arange(rows.shape[1], dtype=np.int64)
 
 
 def _creases(points: Points, facets: Rows) -> Rows:

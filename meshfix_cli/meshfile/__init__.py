@@ -38,6 +38,7 @@ __all__ = [
     "read",
     "write",
     "write_cells",
+    "write_file",
     "write_text",
 ]
 

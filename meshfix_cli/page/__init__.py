@@ -203,18 +203,16 @@ def _worst_row(one: Worst, scene: Scene) -> str:
     cells = f"<td>{one.angle:.3f}</td><td>{one.measure:.3g}</td>"
     cells += '<td class="inverted">yes</td>' if one.inverted else "<td>no</td>"
     cells += f"<td class='place'>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
-    button = f'<button type="button" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
-    return (
-        f'<tr><th scope="row">{one.id}</th>{cells}<td>{button} aria-label="Show element {one.id}">Show</button></td></tr>'
-    )
+    data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
+    button = f'<button type="button" {data} aria-label="Show element {one.id}">Show</button>'
+    return f'<tr><th scope="row">{one.id}</th>{cells}<td>{button}</td></tr>'
 
 
 def _made(report: Report, options: Mapping[str, str]) -> str:
     lines = [("file", [report.name]), *((name, [value]) for name, value in options.items())]
     if report.records:
         lines.append(("sweeps", ["; ".join(phases(report))]))
-    for package in PACKAGES:
-        lines.append((package, [_version(package)]))
+    lines += [(package, [_version(package)]) for package in PACKAGES]
     lines.append(("Python", [f"{platform.python_version()}, {platform.system()} {platform.machine()}"]))
     return _table("Options and versions", ["", "value"], lines, "words")
 
@@ -233,32 +231,40 @@ def _placed(points: Numbers, scene: Scene) -> NDArray[np.float32]:
 
 
 def _scene(scene: Scene) -> dict[str, Any]:
-    """Return what the page's script draws: `points` as base64 of float32, `rows` of uint16, or of uint32 where wide."""
-    points = [scene.boundary, *(state.points for state in scene.states.values())]
-    layers = [_layer("boundary", scene.facets, 0), _layer("creases", scene.creases, 0)]
+    """Return what the page's script draws.
+
+    `points` are base64 of float32, `rows` of uint16 or, where wide, of uint32; layers name both by their place there.
+    """
+    points, extent = [scene.boundary], scene.frame[1]
+    layers: list[dict[str, Any]] = []
+    # One array, such as that of all cells, may be drawn in several stages.
+    rows: dict[int, NDArray[np.int32]] = {}
+
+    def add(role: str, corners: NDArray[np.int32], stage: int | None = None) -> None:
+        if len(corners):
+            rows.setdefault(id(corners), corners)
+            place = {"points": len(points) - 1, "rows": list(rows).index(id(corners))}
+            layers.append({"role": role, "corners": corners.shape[1], "stage": stage, **place})
+
+    add("boundary", scene.facets)
+    add("creases", scene.creases)
     for stage, state in enumerate(scene.states.values()):
-        roles = {"cells": state.cells, "inverted": state.inverted, "worst": state.worst}
-        layers += [_layer(role, rows, stage + 1, stage) for role, rows in roles.items()]
-    extent = scene.frame[1]
+        points.append(state.points)
+        add("cells", state.cells, stage)
+        add("inverted", state.inverted, stage)
+        add("worst", state.worst, stage)
     return {
         "dimension": scene.dimension,
         "extent": (extent / np.linalg.norm(extent)).tolist(),
         "points": [_base64(_placed(one, scene)) for one in points],
-        "layers": [layer for layer in layers if layer["rows"]],
+        "rows": [_numbered(one) for one in rows.values()],
+        "layers": layers,
     }
 
 
-def _layer(role: str, rows: NDArray[np.int32], points: int, stage: int | None = None) -> dict[str, Any]:
+def _numbered(rows: NDArray[np.int32]) -> dict[str, Any]:
     wide = bool(rows.max(initial=0) >= 2**16)
-    packed = rows.astype(np.uint32 if wide else np.uint16)
-    return {
-        "role": role,
-        "corners": rows.shape[1],
-        "points": points,
-        "stage": stage,
-        "wide": wide,
-        "rows": _base64(packed),
-    }
+    return {"wide": wide, "data": _base64(rows.astype(np.uint32 if wide else np.uint16))}
 
 
 def _base64(values: NDArray[Any]) -> str:

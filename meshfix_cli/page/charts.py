@@ -107,7 +107,7 @@ def _first_and_last(values: Sequence[float]) -> str:
 def _round_step(top: float) -> float:
     """Return the distance of four or so round numbers up to `top`, at least 1."""
     size = 10.0 ** math.floor(math.log10(top / 4)) if top > 4 else 1.0
-    return next(size * factor for factor in (1, 2, 2.5, 5, 10) if size * factor * 5 > top or factor == 10)
+    return next(size * factor for factor in (1, 2, 5, 10) if size * factor * 5 > top or factor == 10)
 
 
 def _multiples(step: float, top: float) -> list[float]:

@@ -54,7 +54,7 @@
     out vec4 pixel;
     void main() {
       float r = length(gl_PointCoord - 0.5) * 2.0;
-      float alpha = smoothstep(1.0, 0.9, r) * smoothstep(0.62, 0.72, r);
+      float alpha = smoothstep(1.0, 0.9, r) * smoothstep(0.75, 0.85, r);
       pixel = vec4(colour.rgb, 1) * alpha;
     }`;
   const PLAIN = `#version 300 es
@@ -176,8 +176,8 @@
     const coordinates = scene.points.map((_, number) => points(number));
     const buffers = coordinates.map((values) => buffer(values));
     return scene.layers.map((layer) => {
-      const Kind = layer.wide ? Uint32Array : Uint16Array;
-      const rows = new Kind(decoded(layer.rows)), here = coordinates[layer.points];
+      const { wide, data } = scene.rows[layer.rows];
+      const rows = new (wide ? Uint32Array : Uint16Array)(decoded(data)), here = coordinates[layer.points];
       return {
         ...layer,
         fill: filled(buffers[layer.points], picked(rows, layer.corners, SIDES[layer.corners])),
@@ -303,7 +303,7 @@
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     const of = shown(), colour = colours();
     (flat ? drawFlat : drawSolid)(of, colour);
-    for (const layer of of("worst")) drawRings(layer, colour("worst"));
+    for (const layer of of("worst")) drawRings(layer, colour("ink"));
     canvas.dataset.drawn = Number(canvas.dataset.drawn || 0) + 1;
   }
 
@@ -374,18 +374,17 @@
     if (!pointers.size) canvas.classList.remove("dragged");
   }
 
-  function choose(radio) {
+  function choose(radio, more = "") {
     radio.checked = true;
-    document.getElementById("drawn").textContent = radio.dataset.drawn;
+    document.getElementById("drawn").textContent = radio.dataset.drawn + more;
     redraw();
   }
 
   function show(button) {
     const [x, y, z, reach] = button.dataset.place.split(" ").map(Number);
-    choose(radios[radios.length - 1]);
     view.centre = [x, y, z];
-    view.zoom = Math.min(0.15 / reach, NEAREST);
-    redraw();
+    view.zoom = Math.min(0.25 / reach, NEAREST);
+    choose(radios[radios.length - 1], `; in the middle element ${button.dataset.element}`);
     canvas.scrollIntoView({ block: "center" });
     canvas.focus({ preventScroll: true });
   }

@@ -63,7 +63,7 @@ class Scene:
     facets : (f, d) int32
         Its facets, oriented, as rows of `boundary`.
     creases : (e, 2) int32
-        Edges of a boundary in space at which it has a corner.
+        Edges of a boundary in space at which it has a corner; none where it is coarse.
     coarse : bool
         The boundary has so many facets that it is drawn on a grid.
     states : dict
@@ -181,7 +181,7 @@ def scene(meshes: Mapping[str, Mesh], stages: Mapping[str, Summary], worst: NDAr
     return Scene(
         boundary=boundary,
         facets=facets,
-        creases=_creases(boundary, facets) if mesh.dimension == 3 else np.empty((0, 2), dtype=np.int32),
+        creases=np.empty((0, 2), dtype=np.int32) if coarse or mesh.dimension == 2 else _creases(boundary, facets),
         coarse=coarse,
         states={
             name: drawn(mesh, stages[name].inverted_elements, worst if name == result else worst[:0])

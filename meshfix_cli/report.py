@@ -407,8 +407,11 @@ def _process(rank: int, facts: Mapping[str, Any]) -> str:
     return f"process {rank}: {held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
 
 
-def verdict(report: Report) -> list[str]:
-    """Return in plain words how far vertices moved, and whether the mesh is valid; if not, which elements are wrong."""
+def verdict(report: Report, listing: bool = True) -> list[str]:
+    """Return in plain words how far vertices moved, and whether the mesh is valid; if not, why.
+
+    With `listing`, a line for each inverted element that is listed follows.
+    """
     facts = report.facts or {}
     lines = [_perturbed(facts)] if "moved" in facts else [_displaced(facts)] if "displacement" in facts else []
     count = report.result.inverted
@@ -417,7 +420,10 @@ def verdict(report: Report) -> list[str]:
     if count:
         verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
         text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
-        lines.append(text + (f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"))
+        if listing:
+            text += f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"
+        lines.append(text)
+    if count and listing:
         lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in _listed(report)]
     lines += _impossible(report)
     if report.misnumbered:

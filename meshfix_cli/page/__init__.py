@@ -101,7 +101,7 @@ def _scrolled(caption: str, content: str, style: str = "") -> str:
 
 def _verdict(report: Report) -> str:
     word = "Valid" if report.valid else "Not valid"
-    lines = [*verdict(replace(report, everything=False)), *(f"note: {note}" for note in report.notes)]
+    lines = [*verdict(replace(report, everything=False), listing=False), *(f"note: {note}" for note in report.notes)]
     return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{escape(line)}</p>" for line in lines)
 
 
@@ -202,7 +202,7 @@ def _worst_row(one: Worst, scene: Scene) -> str:
     place = [*corners.mean(axis=0), *[0.0] * (3 - scene.dimension), max(float(reach), 1e-6)]
     cells = f"<td>{one.angle:.3f}</td><td>{one.measure:.3g}</td>"
     cells += '<td class="inverted">yes</td>' if one.inverted else "<td>no</td>"
-    cells += f"<td class='place'>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
+    cells += f"<td>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
     data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
     button = f'<button type="button" {data} aria-label="Show element {one.id}">Show</button>'
     return f'<tr><th scope="row">{one.id}</th>{cells}<td>{button}</td></tr>'

@@ -10,7 +10,7 @@ from meshfix_cli.figures import Convergence
 from meshfix_cli.quality import BIN_WIDTH
 
 WIDTH, HEIGHT = 340, 250
-LEFT, RIGHT, TOP, BOTTOM = 48, 334, 28, 208
+LEFT, RIGHT, TOP, BOTTOM = 48, 330, 28, 208
 MOST_MARKERS = 60  # sweeps: with more, a line is clearer
 MOST_DECADES = 6  # that are labelled
 
@@ -76,13 +76,13 @@ def measures(convergence: Convergence, measure: str) -> str:
     values, x = convergence.measures, _sweeps(len(convergence.measures))
     sizes = [abs(value) for value in values if value] or [1.0]
     low, high = math.floor(math.log10(min(sizes))), math.ceil(math.log10(max(sizes)))
-    high = max(high, low + 1)
+    step = max(1, -(-(high - low) // MOST_DECADES))
+    high = low + step * max(1, -(-(high - low) // step))
 
     def y(value: float) -> float:
         return BOTTOM - (BOTTOM - TOP) * (math.log10(abs(value)) - low) / (high - low)
 
     body = _smoothing(convergence, x)
-    step = -(-(high - low) // MOST_DECADES)
     body += _rows((y(10.0**k), f"10{str(k).translate(_SUPERSCRIPTS)}") for k in range(low, high + 1, step))
     body += _columns(_numbers(len(values), x), "sweeps")
     for name, sign in (("before", -1), ("after", 1)):

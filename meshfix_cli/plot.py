@@ -34,7 +34,7 @@ STYLE: dict[Any, Any] = {  # names of matplotlib's settings
 }
 RED, AMBER, BLUE = "#c2361a", "#f0a500", "#1d6aa8"  # told apart by all eyes, and in grey
 WIDTH, ROW, DPI = 7.2, 2.3, 300  # inches, inches, dots per inch
-MOST_LINES = 20_000  # triangles: the lines of more are pixels in .svg and .pdf as well
+MOST_LINES = 5_000  # triangles: the lines of more are pixels in .svg and .pdf as well
 
 
 def check_plot(target: str) -> None:
@@ -104,9 +104,9 @@ def _picture(axes: Axes, scene: Scene, state: State) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
     middle, extent = scene.frame
-    many = len(state.cells) > MOST_LINES
     roles = (state.cells, "none", "0.25"), (state.worst, AMBER, "k"), (state.inverted, f"{RED}8c", RED)
     for rows, face, line in roles:
+        many = len(rows) > MOST_LINES
         cells = PolyCollection(
             list(state.points[rows]), facecolors=face, edgecolors=line, linewidths=0.1 if many else 0.3, rasterized=many
         )

@@ -252,7 +252,7 @@ def test_cells_need_a_format_that_holds_them(tmp_path: Path) -> None:
         assert "quality can be drawn from .vtu and .vtk files, and this would be obj" in line
     assert "name a file" in error_line("quality", "--cells", "-", TANGLED, code=2)
     assert "is the name of a mesh" in error_line("quality", "--cells", TANGLED, TANGLED, code=2)
-    assert "takes one INPUT" in error_line("quality", "--cells", tmp_path / "c.vtu", TANGLED, VALID, code=2)
+    assert "take one INPUT" in error_line("quality", "--cells", tmp_path / "c.vtu", TANGLED, VALID, code=2)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -257,6 +257,7 @@ def test_an_element_of_the_table_is_shown(visit: Open, written: dict[int, Path])
         name = rows(written[3], "worst elements")[1][0]
         assert tab.locator("#drawn").inner_text() == f"smoothed: 0 inverted elements; in the middle element {name}"
         assert tab.evaluate("document.activeElement.id") == "canvas"
+        assert not tab.locator("#no-picture").is_visible()
     assert closer > 2 * before
 
 
@@ -306,10 +307,18 @@ def test_meshes_that_are_too_large_are_drawn_in_part(
 
 def test_without_webgl_a_sentence_says_so(visit: Open, written: dict[int, Path]) -> None:
     with visit(written[2], script="HTMLCanvasElement.prototype.getContext = () => null") as tab:
-        assert tab.get_by_text("cannot draw the picture").is_visible()
+        assert tab.get_by_text("The picture needs JavaScript and WebGL 2").is_visible()
         assert not tab.locator("canvas").is_visible()
         assert tab.get_by_role("button", name="Show element").count() == 0
         assert tab.get_by_role("table").first.is_visible()
+
+
+def test_without_scripts_the_tables_are_there(visit: Open, written: dict[int, Path]) -> None:
+    with visit(written[2], java_script_enabled=False) as tab:
+        assert tab.get_by_text("The picture needs JavaScript and WebGL 2").is_visible()
+        assert tab.get_by_role("button").count() == 0
+        assert tab.get_by_role("img").count() == 3
+        assert tab.get_by_role("table").count() == 3
 
 
 def test_nothing_but_plain_graphics_is_in_the_file(written: dict[int, Path]) -> None:

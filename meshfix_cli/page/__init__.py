@@ -204,7 +204,7 @@ def _worst_row(one: Worst, scene: Scene) -> str:
     cells += '<td class="inverted">yes</td>' if one.inverted else "<td>no</td>"
     cells += f"<td>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
     data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
-    button = f'<button type="button" {data} aria-label="Show element {one.id}">Show</button>'
+    button = f'<button type="button" hidden {data} aria-label="Show element {one.id}">Show</button>'
     return f'<tr><th scope="row">{one.id}</th>{cells}<td>{button}</td></tr>'
 
 

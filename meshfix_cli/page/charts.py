@@ -28,8 +28,9 @@ def histogram(counts: Mapping[str, Sequence[int]], angle: str) -> str:
         What they are the smallest of.
     """
     names, bins = list(counts), len(next(iter(counts.values())))
-    step = _round_step(max(max(one) for one in counts.values()) or 1)
-    top = math.ceil((max(max(one) for one in counts.values()) or 1) / step) * step
+    largest = max(map(max, counts.values()))
+    step = _round_step(largest)
+    top = math.ceil(largest / step) * step
     width = (RIGHT - LEFT) / bins
 
     def y(count: float) -> float:

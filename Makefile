@@ -3,7 +3,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
-.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs man samples clean
+.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs figures man samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -74,6 +74,14 @@ tables: $(VENV)/installed ## the paper's tables on MESH=FILE
 
 docs: $(VENV)/developer ## make the pages in docs/ a site in out/site
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet --site-dir out/site
+
+# A page of a report is drawn by a browser, which is Debian's `chromium`.
+CHROMIUM := chromium --headless --no-sandbox --hide-scrollbars --use-angle=swiftshader --enable-unsafe-swiftshader
+figures: $(VENV)/developer ## make the pictures of the README again
+	mkdir -p out docs/pictures
+	$(BIN)/meshfix untangle --quiet --dry-run --plot docs/pictures/plate.svg sample_meshes/plate_tangled.vtk
+	$(BIN)/meshfix untangle --quiet --dry-run --report out/report.html sample_meshes/bracket_tangled.vtk
+	$(CHROMIUM) --window-size=1000,1130 --virtual-time-budget=4000 --screenshot=docs/pictures/report.png out/report.html
 
 RELEASED := 2026-11-26
 man: $(VENV)/developer ## make the manual pages in man/ of the help

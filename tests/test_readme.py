@@ -84,3 +84,22 @@ def test_links_lead_somewhere() -> None:
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
             assert target.startswith("https://") or (page.parent / target).exists(), (page.name, target)
+
+
+def test_pictures_are_made_by_make_figures() -> None:
+    pictures = set(re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README))
+    assert pictures
+    made = (ROOT / "Makefile").read_text().partition("\nfigures:")[2].partition("\n\n")[0]
+    assert all(picture in made for picture in pictures)
+
+
+def test_the_picture_of_the_plate_is_what_the_tool_draws(folder: Path) -> None:
+    """But for the release of matplotlib, which is named in it and may place things otherwise."""
+    pytest.importorskip("matplotlib", reason="without matplotlib nothing is plotted: pip install 'meshfix-cli[plot]'")
+    command = ["untangle", "--quiet", "--dry-run", "--plot", "plate.svg", "sample_meshes/plate_tangled.vtk"]
+    run([sys.executable, "-m", "meshfix_cli", *command], folder)
+    drawn, kept = (folder / "plate.svg").read_text(), (ROOT / "docs/pictures/plate.svg").read_text()
+    creator = re.compile("<dc:title>Matplotlib v[^<]*")
+    if creator.findall(drawn) == creator.findall(kept):
+        assert drawn == kept
+    assert "before: 89 inverted" in drawn

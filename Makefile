@@ -11,7 +11,7 @@ help: ## show this list
 # The package installed in place, so that changes of Python files need no new installation; those of kernels do.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-$(VENV)/installed: pyproject.toml $(KERNELS)
+$(VENV)/installed: pyproject.toml $(KERNELS) $(wildcard man/*)
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) --editable . --config-settings=cmake.define.MESHFIX_WERROR=ON
 	touch $@

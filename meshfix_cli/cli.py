@@ -190,10 +190,16 @@ def _check_input(source: str) -> None:
 
 def _open(files: Files, held: Held, show: _Show, *others: str | None) -> tuple[Document, Format]:
     """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
+    from meshfix_cli.meshfile import pieces_of
+
+    for other in _given(*others) if files.backup else ():
+        if Path(other).resolve().name.startswith(f"{Path(files.target).resolve().name}.bak"):
+            raise click.UsageError(f"{other} may be the name of the backup")
     _check_others(_given(*others), files.source, files.target)
     _check_input(files.source)
     document, output = files.open(held, show.threads)
-    _check_others(_given(*others), *document.files)
+    pieces = pieces_of(files.source, files.target)[1]
+    _check_others(_given(*others), *document.files, *pieces)
     if output.binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
@@ -412,9 +418,9 @@ def main() -> None:
     """Repair tangled triangle and tetrahedral meshes by moving interior vertices.
 
     INPUT and OUTPUT are files, or - for stdin and stdout; a .pvtu stands for its pieces, and 'mesh_*.msh', in quotes,
-    for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (nothing was written), 2 wrong usage,
-    3 inverted elements remain, the fixed boundary crosses itself or a --require is not met, 4 some of several meshes
-    cannot be read or, in a batch, are not valid.
+    for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (OUTPUT, or a file beside it, was not written),
+    2 wrong usage, 3 inverted elements remain, the fixed boundary crosses itself or a --require is not met, 4 some of
+    several meshes cannot be read or, in a batch, are not valid.
     """
 
 
@@ -457,6 +463,7 @@ def untangle(
         raise click.UsageError("--quiet and --verbose exclude each other")
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
+        click.get_current_context().params["threads"] = 1
     silent = show.quiet or (show.as_json and not verbose)
     watch = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
     with _processes(method, show.threads, watch) if mpi else nullcontext() as root:
@@ -623,13 +630,22 @@ def _check_other(name: str, *meshes: str) -> None:
     """A file beside the mesh must not replace one, and can be written."""
     from meshfix_cli.meshfile import check_target
 
-    if name == "-":
+    if name == "-" or _is_stdout(name):
         raise click.UsageError("only the mesh can go to stdout; name a file")
+    if not name:
+        raise click.UsageError("the name of a file is empty")
     path = Path(name)
     for other in (Path(mesh) for mesh in meshes if mesh != "-"):
         if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
             raise click.UsageError(f"{name} is the name of a mesh, or of another file to be written")
     check_target(name)
+
+
+def _is_stdout(name: str) -> bool:
+    try:
+        return os.path.samestat(Path(name).stat(), os.fstat(1)) and not Path(name).is_file()
+    except OSError:
+        return False
 
 
 def _write_cells(document: Document, mesh: Mesh, target: str, threads: int) -> None:

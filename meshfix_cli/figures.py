@@ -152,13 +152,19 @@ class Figures:
 def figures(report: Report, threads: int = 1) -> Figures:
     """Find out what is to be drawn of a report that has all stages."""
     stages = list(report.stages)
-    rows = worst_first(report.mesh, report.result.inverted_elements, WORST, threads)
+    inverted = {name: _inverted(report.meshes[name], summary) for name, summary in report.stages.items()}
+    rows = worst_first(report.mesh, inverted[stages[-1]], WORST, threads)
     return Figures(
         histograms={stage: report.stages[stage].histogram for stage in dict.fromkeys((stages[0], stages[-1]))},
         convergence=convergence(report.records) if report.records else None,
-        worst=_worst(report, rows),
-        scene=scene(report.meshes, report.stages, rows),
+        worst=_worst(report, rows, inverted[stages[-1]]),
+        scene=scene(report.meshes, inverted, rows),
     )
+
+
+def _inverted(mesh: Mesh, summary: Summary) -> Rows:
+    """Return the rows that are inverted by shape or, for whoever reads the file, by their numbering."""
+    return np.union1d(summary.inverted_elements, np.flatnonzero(mesh.topology.misnumbered)).astype(np.int32)
 
 
 def convergence(records: Sequence[SweepRecord]) -> Convergence:
@@ -172,8 +178,8 @@ def convergence(records: Sequence[SweepRecord]) -> Convergence:
     )
 
 
-def scene(meshes: Mapping[str, Mesh], stages: Mapping[str, Summary], worst: NDArray[np.int64]) -> Scene:
-    """Return the picture of the stages of a mesh; `worst` are rows of its simplices."""
+def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArray[np.int64]) -> Scene:
+    """Return the picture of the stages of a mesh; `inverted` and `worst` are rows of its simplices."""
     result, mesh = list(meshes.items())[-1]
     boundary, facets, coarse = _coarser(*_boundary(mesh))
     whole = mesh.dimension == 2 and mesh.topology.m <= MOST_CELLS
@@ -184,14 +190,13 @@ def scene(meshes: Mapping[str, Mesh], stages: Mapping[str, Summary], worst: NDAr
         creases=np.empty((0, 2), dtype=np.int32) if coarse or mesh.dimension == 2 else _creases(boundary, facets),
         coarse=coarse,
         states={
-            name: drawn(mesh, stages[name].inverted_elements, worst if name == result else worst[:0])
-            for name, mesh in meshes.items()
+            name: drawn(mesh, inverted[name], worst if name == result else worst[:0]) for name, mesh in meshes.items()
         },
     )
 
 
-def _worst(report: Report, rows: NDArray[np.int64]) -> list[Worst]:
-    simplices, inverted = report.mesh.topology.simplices[rows], np.isin(rows, report.result.inverted_elements)
+def _worst(report: Report, rows: NDArray[np.int64], inverted_rows: Rows) -> list[Worst]:
+    simplices, inverted = report.mesh.topology.simplices[rows], np.isin(rows, inverted_rows)
     measures, _ = _kernels.measure(report.mesh.points, simplices, 1)
     angles = np.degrees(_kernels.angles(report.mesh.points, simplices, 1)[0])
     centroids = report.points()[simplices].mean(axis=1, dtype=np.float64)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from meshfix_cli.errors import WriteError
-from meshfix_cli.figures import Convergence, Figures, Scene, State
+from meshfix_cli.figures import Convergence, Figures, Points, Scene, State
 from meshfix_cli.quality import BIN_WIDTH
 from meshfix_cli.report import Report
 
@@ -41,8 +42,12 @@ def check_plot(target: str) -> None:
     """Raise WriteError now, before any work, where a plot cannot be made or its format is not known."""
     if Path(target).suffix.lower() not in METADATA:
         raise WriteError(f"{target}: plots are written as {', '.join(METADATA)}")
-    if find_spec("matplotlib") is None:
-        raise WriteError(f"{target}: plots need matplotlib: pip install 'meshfix-cli[plot]'")
+    try:
+        import matplotlib.figure  # noqa: F401
+    except ImportError as error:
+        raise WriteError(f"{target}: plots need matplotlib: pip install 'meshfix-cli[plot]'") from error
+    except Exception as error:  # settings of the user that it does not understand
+        raise WriteError(f"{target}: matplotlib does not start: {error}") from error
 
 
 def plot(report: Report, drawn: Figures, target: Path) -> None:
@@ -64,7 +69,9 @@ def plot(report: Report, drawn: Figures, target: Path) -> None:
     import matplotlib
 
     suffix = target.suffix.lower()
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # whatever the user has set
+        matplotlib.rcParams.update(STYLE)
         figure = _figure(report, drawn)
         figure.savefig(target, format=suffix[1:], dpi=DPI, metadata=METADATA[suffix])
 
@@ -84,7 +91,8 @@ def _figure(report: Report, drawn: Figures) -> Figure:
             bands[0].subplots(1, pictures, squeeze=False)[0], drawn.scene.states.items(), strict=True
         ):
             _picture(axes, drawn.scene, state)
-            axes.set_title(f"{name}: {report.stages[name].inverted:,} inverted")
+            amber = f", amber: the worst {len(state.worst)}" if len(state.worst) else ""
+            axes.set_title(f"{name}: {report.stages[name].inverted:,} inverted{amber}")
     axes = bands[-1].subplots(1, charts, squeeze=False)[0]
     angle, measure = ("angle", "area") if flat else ("dihedral angle", "volume")
     _histogram(axes[0], drawn.histograms, angle)
@@ -112,12 +120,22 @@ def _picture(axes: Axes, scene: Scene, state: State) -> None:
         )
         axes.add_collection(cells, autolim=False)
     axes.add_collection(LineCollection(list(scene.boundary[scene.facets]), colors="k", linewidths=0.8), autolim=False)
-    axes.set(
-        aspect="equal",
-        xlim=(middle[0] - 1.05 * extent[0], middle[0] + 1.05 * extent[0]),
-        ylim=(middle[1] - 1.05 * extent[1], middle[1] + 1.05 * extent[1]),
-    )
+    low, high = _window(middle, extent, state)
+    axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.axis("off")
+
+
+def _window(middle: Points, extent: Points, state: State) -> tuple[Points, Points]:
+    """Return the corners of what is shown: also what is inverted beyond the boundary, but for what is far away."""
+    inverted = state.points[state.inverted.ravel()]
+    low, high = (
+        choose(limit, choose.reduce(inverted, axis=0)) if len(inverted) else limit
+        for choose, limit in ((np.minimum, middle - extent), (np.maximum, middle + extent))
+    )
+    return (
+        np.maximum(low, middle - 1.5 * extent) - 0.05 * extent,
+        np.minimum(high, middle + 1.5 * extent) + 0.05 * extent,
+    )
 
 
 def _histogram(axes: Axes, histograms: dict[str, tuple[int, ...]], angle: str) -> None:

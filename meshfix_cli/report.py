@@ -130,8 +130,8 @@ def print_report(report: Report, out: Console) -> None:
     if report.records:
         for text in phases(report):
             line(text)
-    for rank, facts in enumerate((report.facts or {}).get("ranks", ())):
-        line(_process(rank, facts))
+    for rank, text in enumerate(processes(report)):
+        line(f"process {rank}: {text}")
     for note in report.notes:
         line(f"note: {note}")
     for text in verdict(report):
@@ -401,10 +401,12 @@ def phases(report: Report) -> Iterator[str]:
         yield f"{name}: {sweeps} sweep{'s' * (sweeps > 1)}, {left.inverted:,} inverted, {measure}, {seconds:.3g} s"
 
 
-def _process(rank: int, facts: Mapping[str, Any]) -> str:
-    memory = "" if facts["peak_mb"] is None else f", {facts['peak_mb']:,.0f} MB at most"
-    held = f"{facts['vertices']:,} vertices and {facts['ghosts']:,} ghosts"
-    return f"process {rank}: {held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
+def processes(report: Report) -> Iterator[str]:
+    """Say of each of several processes what it held and sent."""
+    for facts in (report.facts or {}).get("ranks", ()):
+        memory = "" if facts["peak_mb"] is None else f", {facts['peak_mb']:,.0f} MB at most"
+        held = f"{facts['vertices']:,} vertices and {facts['ghosts']:,} ghosts"
+        yield f"{held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
 
 
 def verdict(report: Report, listing: bool = True) -> list[str]:

@@ -463,7 +463,8 @@ def check_cluster(folder: Path, command: list[str]) -> None:
     done = subprocess.run([*command, "--json"], cwd=folder, capture_output=True, check=False, timeout=60)
     assert done.returncode == 4, done.stderr.decode()
     assert statuses(done) == {f"{i}.vtk": "failed" if i == 3 else "valid" for i in range(7)}
-    (complaint,) = done.stderr.decode().splitlines()
+    lines = done.stderr.decode().splitlines()
+    (complaint,) = (line for line in lines if "waiting for the first" not in line)  # workers may be late
     assert complaint.startswith("meshfix: error: ")
     assert complaint.endswith("meshes/3.vtk: is empty")
     assert len(list((folder / "repaired").iterdir())) == 6

@@ -18,7 +18,7 @@ FACTORIAL = {2: 2, 3: 6}
 
 def drawn(mesh: Mesh) -> Scene:
     summary = summarise(mesh)
-    return scene({"mesh": mesh}, {"mesh": summary}, worst_first(mesh, summary.inverted_elements, 10))
+    return scene({"mesh": mesh}, {"mesh": summary.inverted_elements}, worst_first(mesh, summary.inverted_elements, 10))
 
 
 def enclosed(points: NDArray[np.float64], facets: NDArray[np.int32]) -> float:

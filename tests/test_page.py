@@ -16,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import meshio
 import numpy as np
 import pytest
 from conftest import SAMPLES
@@ -153,9 +154,9 @@ def test_the_worst_elements_are_named_as_the_file_does(written: dict[int, Path],
     worst = np.argsort(angles, kind="stable")[:10]
     centroids = document.source.points[document.simplices[worst]].mean(axis=1)
     listed = rows(written[dimension], "worst elements")[1:]
-    assert [(line[0], line[1]) for line in listed] == [(str(document.ids[i]), f"{angles[i]:.3f}") for i in worst]
+    assert [(line[0], line[2]) for line in listed] == [(str(document.ids[i]), f"{angles[i]:.3f}") for i in worst]
     for line, centroid in zip(listed, centroids, strict=True):
-        np.testing.assert_allclose([float(x) for x in line[4].strip("()").split(",")], centroid, rtol=1e-5, atol=1e-8)
+        np.testing.assert_allclose([float(x) for x in line[5].strip("()").split(",")], centroid, rtol=1e-5, atol=1e-8)
 
 
 def test_options_and_versions_are_there(tmp_path: Path) -> None:
@@ -170,6 +171,16 @@ def test_options_and_versions_are_there(tmp_path: Path) -> None:
     assert (made["--smooth"], made["--max-move"], made["--strategy"]) == ("0", "2h", "auto (default)")
 
 
+def test_elements_numbered_against_the_rest_are_inverted(tmp_path: Path) -> None:
+    """As `--cells` has it: for whoever reads the file they are."""
+    points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 0.5, 0]]
+    cells = [[0, 1, 4], [1, 2, 4], [2, 4, 3], [3, 0, 4]]
+    meshio.write_points_cells(tmp_path / "m.vtk", np.array(points), [("triangle", np.array(cells))])
+    run("quality", "-q", "--report", tmp_path / "p.html", tmp_path / "m.vtk", code=3)
+    listed = {line[0]: line[4] for line in rows(tmp_path / "p.html", "worst elements")[1:]}
+    assert listed == {"0": "no", "1": "no", "2": "yes", "3": "no"}
+
+
 def test_names_that_cannot_be_written_to(tmp_path: Path) -> None:
     mesh = TANGLED[2]
     assert b"is the name of a mesh" in run("quality", "--report", mesh, mesh, code=2).stderr
@@ -177,6 +188,10 @@ def test_names_that_cannot_be_written_to(tmp_path: Path) -> None:
     assert b"take one INPUT" in run("quality", "--report", tmp_path / "p.html", mesh, mesh, code=2).stderr
     twice = ["--report", tmp_path / "p.svg", "--plot", tmp_path / "p.svg"]
     assert b"of another file to be written" in run("untangle", *twice, mesh, tmp_path / "o.vtk", code=2).stderr
+    assert (
+        b"may be the name of the backup"
+        in run("untangle", "--backup", "--report", tmp_path / "o.vtk.bak", mesh, tmp_path / "o.vtk", code=2).stderr
+    )
     missing = ["--report", tmp_path / "no" / "p.html"]
     assert b"does not exist" in run("untangle", *missing, mesh, tmp_path / "o.vtk", code=1).stderr
     assert list(tmp_path.iterdir()) == []

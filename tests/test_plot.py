@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,6 @@ import pytest
 from click.testing import CliRunner, Result
 from conftest import SAMPLES
 
-from meshfix_cli import plot
 from meshfix_cli.cli import main
 
 TANGLED = str(SAMPLES / "plate_tangled.vtk")
@@ -59,9 +60,34 @@ def test_what_is_missing_is_named_before_any_work(tmp_path: Path, monkeypatch: p
     done = run("untangle", "--plot", tmp_path / "p.gif", TANGLED, tmp_path / "out.vtk")
     assert (done.exit_code, list(tmp_path.iterdir())) == (1, [])
     assert "plots are written as .png, .svg, .pdf" in done.output
-    monkeypatch.setattr(plot, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
     for command in (["untangle", TANGLED, tmp_path / "out.vtk"], ["quality", TANGLED]):
         done = run(command[0], "--plot", tmp_path / "p.png", *command[1:])
         assert (done.exit_code, list(tmp_path.iterdir())) == (1, [])
         assert "plots need matplotlib: pip install 'meshfix-cli[plot]'" in done.output
         assert done.output.count("\n") == 1
+
+
+def test_settings_of_the_user_change_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = []
+    for name, settings in (("a", ""), ("b", "figure.facecolor: black\naxes.grid: True\nsavefig.bbox: tight\n")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "matplotlibrc").write_text(settings)
+        monkeypatch.setenv("MATPLOTLIBRC", str(tmp_path / name / "matplotlibrc"))
+        command = [
+            sys.executable,
+            "-m",
+            "meshfix_cli",
+            "quality",
+            "-q",
+            "--plot",
+            str(tmp_path / f"{name}.svg"),
+            TANGLED,
+        ]
+        subprocess.run(command, check=False)
+        files.append((tmp_path / f"{name}.svg").read_bytes())
+    assert files[0] == files[1]
+    monkeypatch.setenv("MPLBACKEND", "nonsense")
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "matplotlib does not start" in done.stderr

@@ -21,7 +21,7 @@ from meshfix_cli.figures import Figures, Scene, Worst
 from meshfix_cli.mesh import CELL_NAMES
 from meshfix_cli.page import charts
 from meshfix_cli.quality import BIN_WIDTH
-from meshfix_cli.report import Report, phases, quality_rows, required, title, to_json, verdict
+from meshfix_cli.report import Report, phases, processes, quality_rows, required, title, to_json, verdict
 
 FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
 PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")
@@ -58,7 +58,7 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
         lead=_lead(report),
         picture=escape(_in_words(report, drawn.scene)),
         stages=_stages(report, drawn.scene),
-        legend=_legend(drawn.scene),
+        legend=_legend(report, drawn.scene),
         keys=_keys(drawn.scene.dimension),
         quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)),
         requirements=_requirements(report),
@@ -102,6 +102,7 @@ def _scrolled(caption: str, content: str, style: str = "") -> str:
 def _verdict(report: Report) -> str:
     word = "Valid" if report.valid else "Not valid"
     lines = [*verdict(replace(report, everything=False), listing=False), *(f"note: {note}" for note in report.notes)]
+    lines = [line.removeprefix("valid: ").removeprefix("NOT VALID: ") for line in lines]
     return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{escape(line)}</p>" for line in lines)
 
 
@@ -134,12 +135,13 @@ def _stages(report: Report, scene: Scene) -> str:
     return radios
 
 
-def _legend(scene: Scene) -> str:
+def _legend(report: Report, scene: Scene) -> str:
     boundary = "boundary, drawn coarsely" if scene.coarse else "boundary"
     if scene.dimension == 2 and any(len(state.cells) for state in scene.states.values()):
         boundary = "all elements"
     count = len(list(scene.states.values())[-1].worst)
-    items = {"inverted": "inverted elements", "worst": f"the worst {count} of the result", "boundary": boundary}
+    worst = f"the worst {count}" if count > 1 else "the worst one"
+    items = {"inverted": "inverted elements", "worst": f"{worst} of the {_result(report)}", "boundary": boundary}
     return "\n".join(f'<li><i class="{style}"></i>{words}</li>' for style, words in items.items())
 
 
@@ -189,10 +191,11 @@ def _sweeps(report: Report, measure: str) -> str:
 
 def _worst(report: Report, drawn: Figures) -> str:
     angle, measure = ("angle", "area") if report.mesh.dimension == 2 else ("dihedral angle", "volume")
-    columns = ["element", f"smallest {angle} [°]", measure, "inverted", "centroid", "picture"]
+    columns = ["element", "picture", f"smallest {angle} [°]", measure, "inverted", "centroid"]
     head = "".join(f'<th scope="col">{column}</th>' for column in columns)
     body = "".join(_worst_row(one, drawn.scene) for one in drawn.worst)
-    caption = f"The {len(drawn.worst)} worst elements of the result, as the file numbers them"
+    count = f"{len(drawn.worst)} worst elements" if len(drawn.worst) > 1 else "worst element"
+    caption = f"The {count} of the {_result(report)}, as the file numbers them"
     return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>")
 
 
@@ -205,13 +208,18 @@ def _worst_row(one: Worst, scene: Scene) -> str:
     cells += f"<td>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
     data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
     button = f'<button type="button" hidden {data} aria-label="Show element {one.id}">Show</button>'
-    return f'<tr><th scope="row">{one.id}</th>{cells}<td>{button}</td></tr>'
+    return f'<tr><th scope="row">{one.id}</th><td>{button}</td>{cells}</tr>'
+
+
+def _result(report: Report) -> str:
+    return "result" if len(report.stages) > 1 else "mesh"
 
 
 def _made(report: Report, options: Mapping[str, str]) -> str:
     lines = [("file", [report.name]), *((name, [value]) for name, value in options.items())]
     if report.records:
         lines.append(("sweeps", ["; ".join(phases(report))]))
+    lines += [(f"process {rank}", [text]) for rank, text in enumerate(processes(report))]
     lines += [(package, [_version(package)]) for package in PACKAGES]
     lines.append(("Python", [f"{platform.python_version()}, {platform.system()} {platform.machine()}"]))
     return _table("Options and versions", ["", "value"], lines, "words")

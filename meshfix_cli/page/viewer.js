@@ -66,8 +66,7 @@
   const MOST_OUTLINED = 5000; // tetrahedra: the edges of more would hide their colour
   const MOST_EDGES = 30000; // of a boundary in space, for the same reason
   const STEP = Math.PI / 24;
-  const FARTHEST = 0.2, NEAREST = 1e5;
-  const DEPTH = 4; // the mesh has the radius 1
+  const NEAREST = 1e5;
   const START = { yaw: -0.6, pitch: 0.45, zoom: 1, centre: [0, 0, 0] };
 
   const canvas = document.getElementById("canvas");
@@ -77,6 +76,7 @@
   const pointers = new Map();
   let gl, programs, layers, strip, frame = 0;
   let view = { ...START };
+  let radius = 1; // of all that is drawn; the mesh has the radius 1
 
   // What the numbers are: the page holds them as base64.
 
@@ -172,8 +172,16 @@
     return { array, count: centres.length / 3 };
   }
 
+  function farthest(values) {
+    let most = 0;
+    for (let i = 0; i < values.length; i += 3)
+      most = Math.max(most, Math.hypot(values[i], values[i + 1], values[i + 2]));
+    return most;
+  }
+
   function loaded() {
     const coordinates = scene.points.map((_, number) => points(number));
+    radius = coordinates.reduce((most, values) => Math.max(most, farthest(values)), 1);
     const buffers = coordinates.map((values) => buffer(values));
     return scene.layers.map((layer) => {
       const { wide, data } = scene.rows[layer.rows];
@@ -209,9 +217,14 @@
     return h / w > tall ? [h / tall, h] : [w, w * tall];
   }
 
+  // Half of what is seen in front and behind: all of it.
+  function depth() {
+    return 2 * radius + Math.hypot(...view.centre);
+  }
+
   function camera() {
-    const [right, up, back] = axes(), [w, h] = extent(), deep = 20 * h;
-    const rows = [right.map((x) => x / w), up.map((x) => x / h), back.map((x) => -x / DEPTH)];
+    const [right, up, back] = axes(), [w, h] = extent();
+    const rows = [right.map((x) => x / w), up.map((x) => x / h), back.map((x) => -x / depth())];
     const matrix = [];
     for (let k = 0; k < 3; k++) matrix.push(rows[0][k], rows[1][k], rows[2][k], 0);
     const moved = rows.map((row) => -row.reduce((sum, x, k) => sum + x * view.centre[k], 0));
@@ -238,7 +251,7 @@
 
   function drawFill(layer, colour, rim, light) {
     if (!layer.fill.count) return;
-    use(programs.fill, colour, { rim, light, extent: [...extent(), DEPTH] });
+    use(programs.fill, colour, { rim, light, extent: [...extent(), depth()] });
     gl.bindVertexArray(layer.fill.array);
     gl.drawElements(gl.TRIANGLES, layer.fill.count, gl.UNSIGNED_INT, 0);
   }
@@ -283,7 +296,7 @@
 
   function drawSolid(of, colour) {
     gl.enable(gl.DEPTH_TEST);
-    for (const layer of [...of("inverted"), ...of("worst")]) drawFill(layer, colour(layer.role), 0, 1);
+    for (const layer of [...of("worst"), ...of("inverted")]) drawFill(layer, colour(layer.role), 0, 1);
     for (const layer of [...of("inverted"), ...of("worst")]) drawLines(layer, colour("ink", 0.7), 1);
     gl.depthMask(false);
     for (const layer of of("creases")) drawLines(layer, colour("ink", 0.55), 1.3);
@@ -324,9 +337,13 @@
     view.centre = view.centre.map((x, k) => x - right[k] * across * w + up[k] * down * h);
   }
 
+  function within(factor) {
+    return Math.max(0.2 / radius, Math.min(NEAREST, factor));
+  }
+
   // The point under (x, y), from -1 to 1, stays where it is.
   function zoom(factor, x = 0, y = 0) {
-    const next = Math.max(FARTHEST, Math.min(NEAREST, view.zoom * factor)), change = view.zoom / next;
+    const next = within(view.zoom * factor), change = view.zoom / next;
     shift(x * (change - 1), y * (change - 1));
     view.zoom = next;
   }
@@ -383,7 +400,7 @@
   function show(button) {
     const [x, y, z, reach] = button.dataset.place.split(" ").map(Number);
     view.centre = [x, y, z];
-    view.zoom = Math.min(0.25 / reach, NEAREST);
+    view.zoom = within(0.25 / reach);
     choose(radios[radios.length - 1], `; in the middle element ${button.dataset.element}`);
     canvas.scrollIntoView({ block: "center" });
     canvas.focus({ preventScroll: true });

@@ -59,8 +59,8 @@ class Run:
     waiting: float
 
     @classmethod
-    def of(cls, path: Path, ranks: int) -> Run:
-        """Run the command."""
+    def of(cls, path: Path, ranks: int, waits: float) -> Run:
+        """Run the command; `waits` is that of `waiting`, which is the same in each run."""
         command = [MPIEXEC, "-n", str(ranks), sys.executable, "-m", "meshfix_cli", "untangle", "--mpi", "--json"]
         done = subprocess.run([*command, str(path), str(path) + ".out"], capture_output=True, check=True)
         facts: dict[str, Any] = json.loads(done.stdout)
@@ -72,13 +72,14 @@ class Run:
             ranks, facts["elements"], max(part["vertices"] for part in parts), max(part["ghosts"] for part in parts),
             max(part["messages"] for part in parts) / len(records),
             max(part["megabytes"] for part in parts) * 1e6 / len(records), seconds, sweeps,
-            [part["peak_mb"] for part in parts], waiting(path, ranks),
+            [part["peak_mb"] for part in parts], waits,
         )  # fmt: skip
 
 
 def best(path: Path, ranks: int, repeats: int) -> Run:
     """Return the run with the quickest smoothing."""
-    return min((Run.of(path, ranks) for _ in range(repeats)), key=lambda run: run.seconds["smoothing"])
+    waits = waiting(path, ranks)
+    return min((Run.of(path, ranks, waits) for _ in range(repeats)), key=lambda run: run.seconds["smoothing"])
 
 
 def table_of(title: str, runs: Sequence[Run]) -> Table:

@@ -190,16 +190,14 @@ def _check_input(source: str) -> None:
 
 def _open(files: Files, held: Held, show: _Show, *others: str | None) -> tuple[Document, Format]:
     """Read INPUT, and find out before any work whether OUTPUT and other files can be written."""
-    from meshfix_cli.meshfile import pieces_of
-
-    for other in _given(*others) if files.backup else ():
-        if Path(other).resolve().name.startswith(f"{Path(files.target).resolve().name}.bak"):
-            raise click.UsageError(f"{other} may be the name of the backup")
-    _check_others(_given(*others), files.source, files.target)
+    beside = _given(*others)
+    _check_others(beside, files.source, files.target)
     _check_input(files.source)
     document, output = files.open(held, show.threads)
-    pieces = pieces_of(files.source, files.target)[1]
-    _check_others(_given(*others), *document.files, *pieces)
+    written = (files.target,) if files.dry_run else document.outputs(files.target, output)
+    _check_others(beside, *document.files, *written)
+    if files.backup:
+        _check_backups(beside, written)
     if output.binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
@@ -624,6 +622,13 @@ def _given(*names: str | None) -> list[str]:
 def _check_others(names: list[str], *meshes: str) -> None:
     for i, name in enumerate(names):
         _check_other(name, *meshes, *names[:i])
+
+
+def _check_backups(names: list[str], written: tuple[str, ...]) -> None:
+    backups = tuple(f"{Path(one).resolve().name}.bak" for one in written)
+    for name in names:
+        if Path(name).resolve().name.startswith(backups):
+            raise click.UsageError(f"{name} may be the name of the backup")
 
 
 def _check_other(name: str, *meshes: str) -> None:

@@ -249,7 +249,7 @@ def _stars_of(stars: _kernels.Connectivity, blocks: NDArray[np.intp]) -> tuple[N
 def partition(stars: _kernels.Connectivity, ranks: int) -> Numbers:
     """Return the process of each block, by METIS: as many corners each, and few edges between processes."""
     blocks = -(-len(stars.vertices) // _kernels.BLOCK_SIZE)
-    if min(ranks, blocks) == 1 or ranks >= blocks:
+    if ranks == 1 or ranks >= blocks:
         return np.arange(blocks, dtype=np.int32) % ranks
     import pymetis
 

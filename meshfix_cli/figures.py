@@ -51,6 +51,11 @@ class State:
     worst: Rows
     left_out: int
 
+    @property
+    def count(self) -> int:
+        """How many elements are inverted."""
+        return len(self.inverted) + self.left_out
+
 
 @dataclass(frozen=True, eq=False)
 class Scene:

@@ -20,6 +20,8 @@ SMALLEST_SIZE = 1e-45
 
 CELL_NAMES = {2: ("triangle", "triangles"), 3: ("tetrahedron", "tetrahedra")}
 FACET_NAMES = {2: "edge", 3: "triangle"}
+MEASURE_NAMES = {2: "area", 3: "volume"}
+ANGLE_NAMES = {2: "angle", 3: "dihedral angle"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ import numpy as np
 
 from meshfix_cli.errors import WriteError
 from meshfix_cli.figures import Convergence, Figures, Points, Scene, State
+from meshfix_cli.mesh import ANGLE_NAMES, MEASURE_NAMES
 from meshfix_cli.quality import BIN_WIDTH
 from meshfix_cli.report import Report
 
@@ -92,9 +93,9 @@ def _figure(report: Report, drawn: Figures) -> Figure:
         ):
             _picture(axes, drawn.scene, state)
             amber = f", amber: the worst {len(state.worst)}" if len(state.worst) else ""
-            axes.set_title(f"{name}: {report.stages[name].inverted:,} inverted{amber}")
+            axes.set_title(f"{name}: {state.count:,} inverted{amber}")
     axes = bands[-1].subplots(1, charts, squeeze=False)[0]
-    angle, measure = ("angle", "area") if flat else ("dihedral angle", "volume")
+    angle, measure = ANGLE_NAMES[report.mesh.dimension], MEASURE_NAMES[report.mesh.dimension]
     _histogram(axes[0], drawn.histograms, angle)
     if drawn.convergence is not None:
         _inverted(axes[1], drawn.convergence)

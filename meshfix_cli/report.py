@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from meshfix_cli import __version__
-from meshfix_cli.mesh import CELL_NAMES, Mesh
+from meshfix_cli.mesh import ANGLE_NAMES, CELL_NAMES, MEASURE_NAMES, Mesh
 from meshfix_cli.quality import BIN_WIDTH, Requirement, Summary
 
 if TYPE_CHECKING:
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
 LISTED = 10  # inverted elements named in the report
 
-MEASURE_NAMES = {2: "area", 3: "volume"}
 # What can become of a file of a batch, and how it is told.
 STATUSES = {"valid": "valid", "invalid": "NOT VALID", "failed": "failed", "skipped": "skipped"}
 
@@ -127,9 +126,8 @@ def print_report(report: Report, out: Console) -> None:
 
     line(title(report))
     out.print(_quality_table(report))
-    if report.records:
-        for text in phases(report):
-            line(text)
+    for text in phases(report):
+        line(text)
     for rank, text in enumerate(processes(report)):
         line(f"process {rank}: {text}")
     for note in report.notes:
@@ -349,7 +347,7 @@ def title(report: Report) -> str:
 def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
     """Return the rows of the quality table: a label, and the value of each stage."""
     flat, stages = report.mesh.dimension == 2, list(report.stages.values())
-    angle = "angle" if flat else "dihedral angle"
+    angle = ANGLE_NAMES[report.mesh.dimension]
 
     def row(label: str, form: str, field: str) -> tuple[str, list[str]]:
         return label, [format(getattr(summary, field), form) for summary in stages]

@@ -28,7 +28,7 @@ ALLOWED = {
     "report": {"mesh", "obstacles", "quality", "untangle"},
     "figures": {"_kernels", "mesh", "quality", "report", "untangle"},
     "page": {"figures", "mesh", "quality", "report"},
-    "plot": {"errors", "figures", "quality", "report"},
+    "plot": {"errors", "figures", "mesh", "quality", "report"},
     "mpi": {"errors"},
     "dask": {"errors"},
     "distributed": {"_kernels", "errors", "mesh", "meshfile", "obstacles", "repair", "team", "untangle"},

@@ -180,6 +180,15 @@ def test_a_file_whose_name_has_a_star_is_a_file(tmp_path: Path) -> None:
     assert read(odd).mesh.check()[0] == 0
 
 
+def test_no_other_file_takes_the_place_of_a_part_of_the_output(tmp_path: Path) -> None:
+    pattern, _ = by_gmsh(tmp_path, "boxes", 4.1, 0)
+    before = set(tmp_path.iterdir())
+    part = parts(pattern)[0].name.replace("in_", "out_")
+    for beside in (["--history", tmp_path / part], ["--backup", "--history", tmp_path / f"{part}.bak"]):
+        run("untangle", "-q", *beside, pattern, tmp_path / "out_*.msh", code=2)
+    assert set(tmp_path.iterdir()) == before
+
+
 def test_parts_become_one_file_of_another_format(tmp_path: Path) -> None:
     pattern, whole = by_gmsh(tmp_path, "plates", 4.1, 1)
     run("untangle", "-q", pattern, tmp_path / "out.vtk")

@@ -22,8 +22,9 @@ from shapes import block, plate
 from test_cli import error_line, run
 from test_faults import POSIX, SLOW_DISK, WRITES_FOR_EVER, start
 from test_splice import WORD, without_points
+from test_splice import repaired as repaired_with_points
 
-from meshfix_cli import read, untangle, write
+from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import Document
 
@@ -48,14 +49,7 @@ def pieces(path: Path) -> list[Path]:
 
 
 def repaired(path: Path | str, target: Path | str, **options: Any) -> Document:
-    document = read(path, **options)
-    outcome = untangle(document.mesh)
-    assert outcome.records[0].inverted > 0
-    assert outcome.valid
-    result, dropped = write(document, outcome.after, target)
-    assert dropped == ()
-    assert result.check()[0] == 0
-    return document
+    return repaired_with_points(path, target, **options)[0]
 
 
 def in_order_of_pieces(shape: str, count: int, ghosts: bool) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -37,7 +37,7 @@ def make(form: str, variant: str, folder: Path) -> Path:
     return path
 
 
-def repaired(path: Path, target: Path, **options: Any) -> tuple[Document, np.ndarray]:
+def repaired(path: Path | str, target: Path | str, **options: Any) -> tuple[Document, np.ndarray]:
     """Untangle a file; the document, and the points as the new file must have them."""
     document = read(path, **options)
     outcome = untangle(document.mesh)

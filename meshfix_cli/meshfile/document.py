@@ -60,6 +60,11 @@ class Document:
         """(m, d+1) int64: the simplices of the mesh as the file numbers their vertices."""
         return _all_simplices(self.source, self.mesh.dimension)[self.mesh.topology.source]
 
+    def outputs(self, target: str, form: Format) -> tuple[str, ...]:
+        """Return the names of the files that an output in a format has; WriteError where it cannot be."""
+        pieces = self.source.pieces
+        return (target, *(pieces.family.targets(target) if pieces and form == self.format else ()))
+
     def file_points(self, mesh: Mesh) -> NDArray[np.floating[Any]]:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
         original = self.source.points

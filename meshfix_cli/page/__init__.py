@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.figures import Figures, Scene, Worst
-from meshfix_cli.mesh import CELL_NAMES
+from meshfix_cli.mesh import ANGLE_NAMES, CELL_NAMES, MEASURE_NAMES
 from meshfix_cli.page import charts
 from meshfix_cli.quality import BIN_WIDTH
 from meshfix_cli.report import Report, phases, processes, quality_rows, required, title, to_json, verdict
@@ -56,8 +56,8 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
         outcome="valid" if report.valid else "wrong",
         verdict=_verdict(report),
         lead=_lead(report),
-        picture=escape(_in_words(report, drawn.scene)),
-        stages=_stages(report, drawn.scene),
+        picture=escape(_in_words(drawn.scene)),
+        stages=_stages(drawn.scene),
         legend=_legend(report, drawn.scene),
         keys=_keys(drawn.scene.dimension),
         quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)),
@@ -115,17 +115,17 @@ def _lead(report: Report) -> str:
     return f'<dl class="lead">{boxes}</dl>'
 
 
-def _in_words(report: Report, scene: Scene) -> str:
-    counts = ", ".join(f"{summary.inverted:,} inverted {stage}" for stage, summary in report.stages.items())
+def _in_words(scene: Scene) -> str:
+    counts = ", ".join(f"{state.count:,} inverted {stage}" for stage, state in scene.states.items())
     what = "Plane view" if scene.dimension == 2 else "Three-dimensional view"
     return f"{what} of the mesh and its {CELL_NAMES[scene.dimension][1]}: {counts}"
 
 
-def _stages(report: Report, scene: Scene) -> str:
+def _stages(scene: Scene) -> str:
     radios = ""
     for i, (name, state) in enumerate(scene.states.items()):
-        count, shown = report.stages[name].inverted, len(state.inverted)
-        words = f"{name}: {count:,} inverted element{'s' * (count != 1)}"
+        shown = len(state.inverted)
+        words = f"{name}: {state.count:,} inverted element{'s' * (state.count != 1)}"
         if state.left_out:
             words += f", of which {shown:,} are drawn"
         radios += (
@@ -161,7 +161,7 @@ def _requirements(report: Report) -> str:
 
 
 def _charts(report: Report, drawn: Figures) -> str:
-    angle, measure = ("angle", "area") if report.mesh.dimension == 2 else ("dihedral angle", "volume")
+    angle, measure = ANGLE_NAMES[report.mesh.dimension], MEASURE_NAMES[report.mesh.dimension]
     bins = len(report.result.histogram)
     counts = [
         (f"{i * BIN_WIDTH:.0f}–{(i + 1) * BIN_WIDTH:.0f}°", [f"{one[i]:,}" for one in drawn.histograms.values()])
@@ -190,7 +190,7 @@ def _sweeps(report: Report, measure: str) -> str:
 
 
 def _worst(report: Report, drawn: Figures) -> str:
-    angle, measure = ("angle", "area") if report.mesh.dimension == 2 else ("dihedral angle", "volume")
+    angle, measure = ANGLE_NAMES[report.mesh.dimension], MEASURE_NAMES[report.mesh.dimension]
     columns = ["element", "picture", f"smallest {angle} [°]", measure, "inverted", "centroid"]
     head = "".join(f'<th scope="col">{column}</th>' for column in columns)
     body = "".join(_worst_row(one, drawn.scene) for one in drawn.worst)

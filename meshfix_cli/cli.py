@@ -602,6 +602,8 @@ def _default_signals() -> Iterator[None]:
 
 def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
     """End all processes with the error of one: the others would wait for it for ever."""
+    from meshfix_cli.mpi import abort
+
     code = ERROR
     if isinstance(error, SystemExit):  # a signal
         code = error.code if isinstance(error.code, int) else ERROR
@@ -611,8 +613,7 @@ def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
         traceback.print_exception(error)
     sys.stdout.flush()
     sys.stderr.flush()
-    comm.Abort(code)
-    os._exit(code)  # Abort may return before the launcher ends this process
+    abort(comm, code)
 
 
 def _given(*names: str | None) -> list[str]:
@@ -737,7 +738,7 @@ class _Run:
 
         with _default_signals():
             mpi.world(_launched())
-        return mpi.workers(_launched())
+        return mpi.workers(_abort, _launched())
 
 
 _listing = _packed(

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import stat
+import time
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NoReturn, cast
 
 from meshfix_cli.errors import MeshfixError
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
+
+# For how many seconds a launcher may take to read the error of a process before all are ended.
+PATIENCE = 5.0
 
 
 def world(launched: int | None = None) -> Intracomm:
@@ -47,12 +53,60 @@ def world(launched: int | None = None) -> Intracomm:
     return comm
 
 
+def abort(comm: Intracomm, code: int) -> NoReturn:
+    """End all processes, once the launcher has the error that this one has written to stderr.
+
+    Parameters
+    ----------
+    comm : mpi4py.MPI.Intracomm
+    code : int
+        The exit code.
+    """
+    drained(2, PATIENCE)  # MPICH's ends without what it has not read: in one run of thirty the error was lost
+    comm.Abort(code)
+    os._exit(code)  # Abort may return before the launcher ends this process
+
+
+def drained(descriptor: int, patience: float) -> bool:
+    """Return whether all that was written to a pipe is read, within a time.
+
+    Parameters
+    ----------
+    descriptor : int
+        Where it was written; what is not a pipe is taken for read.
+    patience : float
+        Seconds.
+    """
+    end = time.monotonic() + patience
+    while _holds(descriptor):
+        if time.monotonic() > end:
+            return False
+        time.sleep(1e-3)
+    return True
+
+
+def _holds(descriptor: int) -> bool:
+    try:
+        import fcntl
+        import termios
+
+        if not stat.S_ISFIFO(os.fstat(descriptor).st_mode):
+            return False
+        return any(fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)))
+    except (ImportError, OSError):  # another system, or stderr is closed
+        return False
+
+
 @contextmanager
-def workers(launched: int | None = None) -> Iterator[tuple[Executor | None, int]]:
+def workers(
+    failed: Callable[[Intracomm, BaseException], NoReturn], launched: int | None = None
+) -> Iterator[tuple[Executor | None, int]]:
     """Let all processes but the first work; the first gets an executor and their number, the others None at the end.
 
     Parameters
     ----------
+    failed : callable
+        Tells an error of a process that works, and ends all: the first would wait for it for ever.
     launched : int, optional
 
     Raises
@@ -73,7 +127,7 @@ def workers(launched: int | None = None) -> Iterator[tuple[Executor | None, int]
                 if executor is not None:
                     executor.shutdown(cancel_futures=True)
                 raise
-    except BaseException:
-        if serving:  # the others would wait for this one for ever
-            comm.Abort(1)
+    except BaseException as error:
+        if serving:
+            failed(comm, error)
         raise

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 sys.path += [str(Path(__file__).parents[1] / "sample_meshes"), str(Path(__file__).parent)]
 import generate
@@ -43,7 +42,6 @@ METHODS = {
     "plane": Method(),
     "planebest": Method(smooth="best"),
     "small": Method(),
-    "fails": Method(),
 }
 
 
@@ -83,11 +81,11 @@ original = Ranks.sweep
 
 def main(cases: list[str]) -> None:
     """Run the cases."""
+    from mpi4py import MPI  # the tests read METHODS also where it is not installed
+
     comm = MPI.COMM_WORLD
     for case in cases:
         method = METHODS[case]
-        if case == "fails":
-            Ranks.sweep = fail  # type: ignore[method-assign, assignment]
         if comm.rank != ROOT:
             serve(comm, method, 1)
             continue

@@ -8,6 +8,7 @@ import shlex
 import shutil
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, wait
@@ -441,11 +442,14 @@ def test_options_reach_the_work(inputs: Path, out: Path) -> None:
     assert (out / "a.vtk.bak").read_text() == "precious"
 
 
+# Where programs of this environment and of the system are.
+BINARIES = f"{Path(MESHFIX).parent}{os.pathsep}{os.environ['PATH']}"
+
+
 def shown(start: str) -> list[str]:
     """The words of a command that docs/many.md shows for clusters, for three processes at most."""
     (line,) = (line for line in (ROOT / "docs/many.md").read_text().splitlines() if line.startswith(start))
-    place = str(Path(MESHFIX).parent)
-    return ["env", f"PATH={place}{os.pathsep}{os.environ['PATH']}", *shlex.split(line.replace("-n 64", "-n 3"))]
+    return ["env", f"PATH={BINARIES}", *shlex.split(line.replace("-n 64", "-n 3"))]
 
 
 @pytest.fixture
@@ -470,16 +474,45 @@ def check_cluster(folder: Path, command: list[str]) -> None:
     assert len(list((folder / "repaired").iterdir())) == 6
 
 
-def test_mpi(cluster: Path) -> None:
+def mpiexec() -> str:
     pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
-    command = shown("mpiexec -n 64")
-    if shutil.which("mpiexec", path=command[1].removeprefix("PATH=")) is None:
+    found = shutil.which("mpiexec", path=BINARIES)
+    if found is None:
         pytest.skip("there is no mpiexec")
+    return found
+
+
+def test_mpi(cluster: Path) -> None:
+    mpiexec()
+    command = shown("mpiexec -n 64")
     check_cluster(cluster, command)
     wrong = subprocess.run(
         [*command, "--output-dir", "meshes"], cwd=cluster, capture_output=True, check=False, timeout=60
     )
     assert wrong.stderr.count(b"would replace the input") == 1
+
+
+def test_a_process_of_mpi_that_cannot_work_ends_all(tmp_path: Path) -> None:
+    fill(tmp_path, "a.vtk")
+    command = [mpiexec(), "-n", "3", sys.executable, "-c", BROKEN, "a.vtk", "repaired"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert done.returncode == 1
+    assert "meshfix: error: process 2: MemoryError\n" in done.stderr
+
+
+# The command with a last process that has no memory to begin its work.
+BROKEN = """
+import sys
+from mpi4py import MPI, futures
+enter = futures.MPICommExecutor.__enter__
+def fail(self):
+    if MPI.COMM_WORLD.rank == 2:
+        raise MemoryError
+    return enter(self)
+futures.MPICommExecutor.__enter__ = fail
+from meshfix_cli.cli import main
+main(["batch", "--executor", "mpi", "-q", sys.argv[1], "--output-dir", sys.argv[2]])
+"""
 
 
 @pytest.mark.parametrize("variable", ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS"])

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +25,12 @@ pytest.importorskip(
 from meshfix_cli import _kernels
 from meshfix_cli.distributed import Part, Ranks, partition, parts
 from meshfix_cli.mesh import Mesh
+from meshfix_cli.mpi import drained
 
 BIN = Path(sys.executable).parent
 MESHFIX = [sys.executable, "-m", "meshfix_cli"]
 MPIEXEC = shutil.which("mpiexec", path=f"{BIN}{os.pathsep}{os.environ['PATH']}")
 needs_mpi = pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: pip install mpich")
-SOLVED = [name for name in METHODS if name != "fails"]
 
 
 def mpiexec(count: int, *command: object, code: int = 0, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -74,8 +75,8 @@ def test_the_bytes_of_a_large_mesh_are_those_of_one_process(large: Path, tmp_pat
 
 @needs_mpi
 def test_every_move_has_the_bits_of_one_process() -> None:
-    done = mpiexec(3, sys.executable, Path(__file__).with_name("over_ranks.py"), *SOLVED)
-    assert done.stdout.split("\n")[:-1] == [f"{name} True" for name in SOLVED]
+    done = mpiexec(3, sys.executable, Path(__file__).with_name("over_ranks.py"), *METHODS)
+    assert done.stdout.split("\n")[:-1] == [f"{name} True" for name in METHODS]
 
 
 def write(path: Path, form: str, mesh: Mesh, dtype: str, **options: object) -> None:
@@ -152,6 +153,23 @@ def test_inverted_elements_that_remain_are_told_by_the_exit_code(tmp_path: Path)
 def test_a_process_that_fails_in_a_sweep_ends_all() -> None:
     done = mpiexec(3, sys.executable, "-c", FAILS, code=1)
     assert "meshfix: error: process 2: MemoryError" in done.stderr
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes are asked as POSIX systems allow it")
+def test_an_error_waits_for_the_launcher_to_read_it(tmp_path: Path) -> None:
+    end, pipe = os.pipe()
+    os.write(pipe, b"meshfix: error: ...\n")
+    assert not drained(pipe, 0.01)
+    reader = threading.Timer(0.05, os.read, (end, 100))
+    reader.start()
+    assert drained(pipe, 60)
+    reader.join()
+    os.close(pipe)
+    os.close(end)
+    assert drained(pipe, 0.01)
+    with (tmp_path / "errors").open("w") as file:
+        file.write("meshfix: error: ...\n")
+        assert drained(file.fileno(), 0.01)
 
 
 # The command of the last process with a sweep that runs out of memory.

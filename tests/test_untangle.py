@@ -143,7 +143,7 @@ def test_arguments_out_of_range_are_refused(plate: Mesh, wrong: dict[str, Any]) 
 def test_what_cannot_be_mended_does_not_stop_the_best_smoothing(bracket: Mesh) -> None:
     stuck = with_an_inverted_fixed_simplex(tangle(bracket))
     free = bracket.movable[bracket.topology.simplices].any(axis=1)
-    default, best = (untangle(stuck, smooth=smooth).after for smooth in (3, "best"))
+    default, best = (untangle(stuck, smooth=smooth, threads=2).after for smooth in (3, "best"))
     valid = evaluate("min_sine", best)[free] > 0
     assert valid.sum() >= (evaluate("min_sine", default)[free] > 0).sum()
     assert evaluate("min_angle", best)[free].mean() > evaluate("min_angle", default)[free].mean()
@@ -270,7 +270,7 @@ def test_max_move_bounds_every_displacement(mesh: Mesh, strategy: str) -> None:
     h = tangled.mean_edge_length()
     free = displacement(tangled, untangle(tangled, strategy).after)["largest"]
     for bound in (0.9 * free, 0.3 * h, 1e-3 * h, 0.0):
-        outcome = untangle(tangled, strategy, max_move=bound, sweeps=60)
+        outcome = untangle(tangled, strategy, max_move=bound, sweeps=60, threads=2)
         assert displacement(tangled, outcome.after)["largest"] <= bound
         assert outcome.records[-1].rank <= outcome.records[0].rank
         assert outcome.valid or bound < 0.9 * free
@@ -304,10 +304,10 @@ def test_what_can_be_mended_is_mended_beside_what_cannot(mesh: Mesh) -> None:
     """One vertex of a simplex without a free one is wrong; the tangle elsewhere is solved all the same."""
     stuck = with_an_inverted_fixed_simplex(mesh)
     both = stuck.with_points(np.where(mesh.movable[:, None], tangle(mesh).points, stuck.points))
-    outcome = untangle(both)
+    outcome = untangle(both, threads=2)
     assert len(outcome.obstacles.inverted) >= 1
     assert not outcome.valid
-    assert outcome.records[-1].inverted <= untangle(stuck).records[-1].inverted + 1 < both.check()[0]
+    assert outcome.records[-1].inverted <= untangle(stuck, threads=2).records[-1].inverted + 1 < both.check()[0]
 
 
 def test_where_nothing_is_mended_nothing_else_suffers(plate: Mesh) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import generate
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh import Mesh
 from meshfix_cli.perturb import perturb
+
+# A shell starts what runs in the background with SIGINT ignored, which the programs that the tests start would inherit.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_meshes"

@@ -6,6 +6,9 @@ KERNELS := $(wildcard meshfix_cli/kernels/*)
 # Where it is set, each of the hundreds of processes of the tests compiles every module anew.
 unexport PYTHONDONTWRITEBYTECODE
 
+# As the command line sets it. More threads of BLAS gain nothing, and where a core is busy, as much as halve the speed.
+export OPENBLAS_NUM_THREADS := 1
+
 .PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs figures man samples clean
 
 help: ## show this list

@@ -36,7 +36,7 @@ demo: $(VENV)/installed ## install in .venv, tangle a 3-D sample and repair it
 	$(BIN)/meshfix untangle out/tangled.vtk out/repaired.vtk
 
 test: $(VENV)/developer ## run the tests
-	$(BIN)/pytest
+	$(BIN)/pytest -n auto --dist worksteal
 
 lint: $(VENV)/developer ## ruff, ruff format and mypy
 	$(BIN)/ruff check .

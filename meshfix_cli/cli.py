@@ -241,6 +241,8 @@ class _Draw:
         return _given(*astuple(self))
 
     def check(self) -> None:
+        if self.page is not None and Path(self.page).suffix.lower() == ".json":
+            raise click.UsageError(f"{self.page}: --report writes a page in HTML; --json prints the report as JSON")
         if self.plot is not None:
             from meshfix_cli.plot import check_plot
 
@@ -677,6 +679,8 @@ class _Listed:
         """Inputs and outputs, checked before any work."""
         from meshfix_cli.batch import distinct, expanded, named_in, outputs
 
+        if self.report is not None and Path(self.report).suffix.lower() in (".html", ".htm"):
+            raise click.UsageError(f"{self.report}: the report on many meshes is JSON")
         if self.files_from is not None:
             _check_input(self.files_from)
         try:

@@ -145,7 +145,7 @@ def _histogram(axes: Axes, histograms: dict[str, tuple[int, ...]], angle: str) -
     axes.stairs(histograms[names[-1]], edges, fill=True, color=BLUE, alpha=0.6, label=names[-1])
     if len(names) > 1:
         axes.stairs(histograms[names[0]], edges, color=RED, linewidth=1.0, label=names[0])
-        axes.legend()
+        _legend(axes)
     axes.set(xlim=(0, edges[-1]), xlabel=f"smallest {angle} [°]", ylabel="elements")
 
 
@@ -175,6 +175,15 @@ def _sweeps(axes: Axes, convergence: Convergence) -> None:
     axes.set(xlabel="sweeps", xlim=(-margin, last + margin))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if convergence.smoothing is not None:
-        axes.axvspan(convergence.smoothing, last + margin, color="0.93", linewidth=0, zorder=0, label="smoothing")
-    if axes.get_legend_handles_labels()[0]:
-        axes.legend()
+        axes.axvspan(convergence.smoothing, last + margin, color="0.9", linewidth=0, zorder=0, label="smoothing")
+    _legend(axes)
+
+
+def _legend(axes: Axes) -> None:
+    """Name what is drawn, above it: inside there may be no room."""
+    handles, _ = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            loc="lower right", bbox_to_anchor=(1.0, 1.0), ncol=len(handles), borderaxespad=0.1, handlelength=1.2,
+            handletextpad=0.5, columnspacing=1.2,
+        )  # fmt: skip

@@ -208,6 +208,7 @@ def test_shards_cover_all_files_once(inputs: Path, out: Path) -> None:
         (["in/a.vtk", "--output-dir", "link"], "link/a.vtk would replace the input in/a.vtk"),
         (["in/a.vtk", "--report", "in/a.vtk"], "in/a.vtk would replace the input in/a.vtk"),
         (["in/a.vtk", "--report", "out/a.vtk"], "in/a.vtk and out/a.vtk would both be written to out/a.vtk"),
+        (["in/a.vtk", "--report", "r.html"], "r.html: the report on many meshes is JSON"),
         (["in/a.vtk", "--shard", "0/2"], "'0/2' is not such as 1/8"),
         (["in/a.vtk", "--shard", "3/2"], "'3/2' is not such as 1/8"),
         (["in/a.vtk", "--executor", "dask"], "--executor dask and --scheduler-file go together"),

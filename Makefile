@@ -1,5 +1,6 @@
 PYTHON ?= python3
 VENV   := .venv
+CORES  := $(shell nproc 2>/dev/null || echo auto)
 BIN    := $(VENV)/bin
 KERNELS := $(wildcard meshfix_cli/kernels/*)
 
@@ -8,6 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # As the command line sets it. More threads of BLAS gain nothing, and where a core is busy, as much as halve the speed.
 export OPENBLAS_NUM_THREADS := 1
+export MKL_NUM_THREADS := 1
 
 .PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs figures man samples clean
 
@@ -36,7 +38,7 @@ demo: $(VENV)/installed ## install in .venv, tangle a 3-D sample and repair it
 	$(BIN)/meshfix untangle out/tangled.vtk out/repaired.vtk
 
 test: $(VENV)/developer ## run the tests
-	$(BIN)/pytest -n auto --dist worksteal
+	$(BIN)/pytest -n $(CORES) --dist worksteal
 
 lint: $(VENV)/developer ## ruff, ruff format and mypy
 	$(BIN)/ruff check .

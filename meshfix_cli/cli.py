@@ -606,16 +606,16 @@ def _abort(comm: Intracomm, error: BaseException) -> NoReturn:
     """End all processes with the error of one: the others would wait for it for ever."""
     from meshfix_cli.mpi import abort
 
-    code = ERROR
-    if isinstance(error, SystemExit):  # a signal
-        code = error.code if isinstance(error.code, int) else ERROR
-    elif isinstance(error, (MeshfixError, MemoryError, OSError)):
-        _complain(f"process {comm.rank}: {str(error) or type(error).__name__}")
-    else:
-        traceback.print_exception(error)
-    sys.stdout.flush()
-    sys.stderr.flush()
-    abort(comm, code)
+    code = error.code if isinstance(error, SystemExit) and isinstance(error.code, int) else ERROR
+    try:
+        if isinstance(error, (MeshfixError, MemoryError, OSError)):
+            _complain(f"process {comm.rank}: {str(error) or type(error).__name__}")
+        elif not isinstance(error, SystemExit):  # of a signal
+            traceback.print_exception(error)
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        abort(comm, code)
 
 
 def _given(*names: str | None) -> list[str]:

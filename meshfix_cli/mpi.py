@@ -54,7 +54,7 @@ def world(launched: int | None = None) -> Intracomm:
 
 
 def abort(comm: Intracomm, code: int) -> NoReturn:
-    """End all processes, once the launcher has the error that this one has written to stderr.
+    """End all processes, once the launcher has read what this one has written to stderr, or after `PATIENCE`.
 
     Parameters
     ----------
@@ -62,13 +62,15 @@ def abort(comm: Intracomm, code: int) -> NoReturn:
     code : int
         The exit code.
     """
-    drained(2, PATIENCE)  # MPICH's ends without what it has not read: in one run of thirty the error was lost
-    comm.Abort(code)
-    os._exit(code)  # Abort may return before the launcher ends this process
+    try:
+        drained(2, PATIENCE)  # MPICH's launcher drops what it has not read: the error of one run in thirty
+    finally:  # also where a signal ends the wait: the others would wait for this process for ever
+        comm.Abort(code)
+        os._exit(code)  # Abort may return before the launcher ends this process
 
 
 def drained(descriptor: int, patience: float) -> bool:
-    """Return whether all that was written to a pipe is read, within a time.
+    """Return whether all that was written to a pipe is read, within a time; only Linux can tell, of its writing end.
 
     Parameters
     ----------
@@ -93,7 +95,7 @@ def _holds(descriptor: int) -> bool:
         if not stat.S_ISFIFO(os.fstat(descriptor).st_mode):
             return False
         return any(fcntl.ioctl(descriptor, termios.FIONREAD, bytes(4)))
-    except (ImportError, OSError):  # another system, or stderr is closed
+    except (ImportError, OSError):  # Windows, or it is closed
         return False
 
 

@@ -1,4 +1,4 @@
-"""Meshes for the tests, made by the project's own generator."""
+"""Meshes for the tests, made by the project's own generator, and the signals that their programs get."""
 
 from __future__ import annotations
 

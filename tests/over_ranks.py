@@ -1,7 +1,7 @@
 """What the tests run in several processes: `mpiexec -n 3 python over_ranks.py CASE...`.
 
 Each case is solved by the processes and by one alone; the root prints its name, and whether the bits and the counts of
-the records are the same. The case `fails` raises an error in the last process, in the middle of a sweep.
+the records are the same.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import generate
@@ -22,10 +23,9 @@ from over_ranks import METHODS
 pytest.importorskip(
     "pymetis", reason="without pymetis no mesh is shared among processes: pip install 'meshfix-cli[mpi]'"
 )
-from meshfix_cli import _kernels
+from meshfix_cli import _kernels, mpi
 from meshfix_cli.distributed import Part, Ranks, partition, parts
 from meshfix_cli.mesh import Mesh
-from meshfix_cli.mpi import drained
 
 BIN = Path(sys.executable).parent
 MESHFIX = [sys.executable, "-m", "meshfix_cli"]
@@ -155,21 +155,34 @@ def test_a_process_that_fails_in_a_sweep_ends_all() -> None:
     assert "meshfix: error: process 2: MemoryError" in done.stderr
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes are asked as POSIX systems allow it")
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells of the writing end of a pipe what is in it")
 def test_an_error_waits_for_the_launcher_to_read_it(tmp_path: Path) -> None:
     end, pipe = os.pipe()
     os.write(pipe, b"meshfix: error: ...\n")
-    assert not drained(pipe, 0.01)
+    assert not mpi.drained(pipe, 0.01)
     reader = threading.Timer(0.05, os.read, (end, 100))
     reader.start()
-    assert drained(pipe, 60)
+    assert mpi.drained(pipe, 60)
     reader.join()
     os.close(pipe)
     os.close(end)
-    assert drained(pipe, 0.01)
+    assert mpi.drained(pipe, 0.01)
     with (tmp_path / "errors").open("w") as file:
         file.write("meshfix: error: ...\n")
-        assert drained(file.fileno(), 0.01)
+        assert mpi.drained(file.fileno(), 0.01)
+
+
+def test_a_signal_while_an_error_is_read_ends_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*arguments: object) -> bool:
+        raise SystemExit(143)
+
+    ended: list[tuple[str, int]] = []
+    monkeypatch.setattr(mpi, "drained", interrupted)
+    monkeypatch.setattr(os, "_exit", lambda code: ended.append(("exit", code)))
+    comm: Any = SimpleNamespace(Abort=lambda code: ended.append(("Abort", code)))
+    with pytest.raises(SystemExit):
+        mpi.abort(comm, 1)
+    assert ended == [("Abort", 1), ("exit", 1)]
 
 
 # The command of the last process with a sweep that runs out of memory.

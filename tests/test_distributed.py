@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -30,7 +31,9 @@ from meshfix_cli.mesh import Mesh
 BIN = Path(sys.executable).parent
 MESHFIX = [sys.executable, "-m", "meshfix_cli"]
 MPIEXEC = shutil.which("mpiexec", path=f"{BIN}{os.pathsep}{os.environ['PATH']}")
-needs_mpi = pytest.mark.skipif(MPIEXEC is None, reason="there is no mpiexec: pip install mpich")
+needs_mpi = pytest.mark.skipif(
+    MPIEXEC is None or find_spec("mpi4py") is None, reason="there is no MPI: pip install 'meshfix-cli[mpi]' mpich"
+)
 
 
 def mpiexec(count: int, *command: object, code: int = 0, **options: Any) -> subprocess.CompletedProcess[str]:

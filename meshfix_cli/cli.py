@@ -565,10 +565,8 @@ def quality(
 def _processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) -> Iterator[Root]:
     """Give the root those that mpiexec has started; they work for it, and end as it does."""
     from meshfix_cli.distributed import ROOT, Root, serve
-    from meshfix_cli.mpi import world
 
-    with _default_signals():  # the others wait for this process in there, and hear nothing
-        comm = world(_launched())
+    comm = _world()
     _others.add("mpi")
     if comm.rank != ROOT:
         try:
@@ -591,12 +589,13 @@ def _processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) ->
         root.dismiss(code)
 
 
-@contextmanager
-def _default_signals() -> Iterator[None]:
-    """Let signals end the process where it is."""
+def _world() -> Intracomm:
+    """Find the processes; until all are there, signals end this one where it is."""
+    from meshfix_cli.mpi import world
+
     handlers = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        yield
+        return world(_launched())
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)
@@ -740,9 +739,7 @@ class _Run:
             return dask.workers(self.scheduler_file)
         from meshfix_cli import mpi
 
-        with _default_signals():
-            mpi.world(_launched())
-        return mpi.workers(_abort, _launched())
+        return mpi.workers(_world(), _abort)
 
 
 _listing = _packed(

@@ -101,22 +101,16 @@ def _holds(descriptor: int) -> bool:
 
 @contextmanager
 def workers(
-    failed: Callable[[Intracomm, BaseException], NoReturn], launched: int | None = None
+    comm: Intracomm, failed: Callable[[Intracomm, BaseException], NoReturn]
 ) -> Iterator[tuple[Executor | None, int]]:
     """Let all processes but the first work; the first gets an executor and their number, the others None at the end.
 
     Parameters
     ----------
+    comm : mpi4py.MPI.Intracomm
     failed : callable
         Tells an error of a process that works, and ends all: the first would wait for it for ever.
-    launched : int, optional
-
-    Raises
-    ------
-    MeshfixError
-        See `world`.
     """
-    comm = world(launched)
     from mpi4py.futures import MPICommExecutor
 
     serving = comm.Get_rank() > 0

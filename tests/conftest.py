@@ -1,8 +1,12 @@
-"""Meshes for the tests, made by the project's own generator, and the signals that their programs get."""
+"""Meshes for the tests, made by the project's own generator, and what their programs need."""
 
 from __future__ import annotations
 
+import os
+import shutil
 import signal
+import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import generate
@@ -18,6 +22,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "sample_meshes"
+
+# Where programs of this environment and of the system are.
+BINARIES = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+MPIEXEC = shutil.which("mpiexec", path=BINARIES)
+needs_mpi = pytest.mark.skipif(
+    MPIEXEC is None or find_spec("mpi4py") is None, reason="there is no MPI: pip install 'meshfix-cli[mpi]' mpich"
+)
 
 
 @pytest.fixture(scope="session")

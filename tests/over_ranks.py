@@ -7,7 +7,6 @@ the records are the same.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ sys.path += [str(Path(__file__).parents[1] / "sample_meshes"), str(Path(__file__
 import generate
 from conftest import tangle
 
-from meshfix_cli.distributed import ROOT, Ranks, Root, serve
+from meshfix_cli.distributed import ROOT, Root, serve
 from meshfix_cli.mesh import Mesh
 from meshfix_cli.perturb import Distance
 from meshfix_cli.repair import Method
@@ -67,16 +66,6 @@ def facts(outcome: Outcome) -> tuple[Any, ...]:
     same = tuple(a is b for a in meshes for b in meshes)
     records = tuple(replace(record, seconds=0.0) for record in outcome.records)
     return tuple(mesh.points.tobytes() for mesh in meshes), same, records
-
-
-def fail(self: Ranks, *arguments: object) -> Iterator[None]:
-    """Stand in for a sweep that runs out of memory."""
-    if self.comm.rank == self.comm.size - 1:
-        raise MemoryError
-    return original(self, *arguments)  # type: ignore[arg-type, return-value]
-
-
-original = Ranks.sweep
 
 
 def main(cases: list[str]) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from conftest import ROOT
+from conftest import BINARIES, MPIEXEC, ROOT, needs_mpi
 from test_cli import MESHFIX, TANGLED, error_line, on_terminal, run
 
 from meshfix_cli import __version__, batch, read
@@ -443,10 +443,6 @@ def test_options_reach_the_work(inputs: Path, out: Path) -> None:
     assert (out / "a.vtk.bak").read_text() == "precious"
 
 
-# Where programs of this environment and of the system are.
-BINARIES = f"{Path(MESHFIX).parent}{os.pathsep}{os.environ['PATH']}"
-
-
 def shown(start: str) -> list[str]:
     """The words of a command that docs/many.md shows for clusters, for three processes at most."""
     (line,) = (line for line in (ROOT / "docs/many.md").read_text().splitlines() if line.startswith(start))
@@ -475,16 +471,8 @@ def check_cluster(folder: Path, command: list[str]) -> None:
     assert len(list((folder / "repaired").iterdir())) == 6
 
 
-def mpiexec() -> str:
-    pytest.importorskip("mpi4py", reason="the extra mpi is not installed")
-    found = shutil.which("mpiexec", path=BINARIES)
-    if found is None:
-        pytest.skip("there is no mpiexec")
-    return found
-
-
+@needs_mpi
 def test_mpi(cluster: Path) -> None:
-    mpiexec()
     command = shown("mpiexec -n 64")
     check_cluster(cluster, command)
     wrong = subprocess.run(
@@ -493,9 +481,10 @@ def test_mpi(cluster: Path) -> None:
     assert wrong.stderr.count(b"would replace the input") == 1
 
 
+@needs_mpi
 def test_a_process_of_mpi_that_cannot_work_ends_all(tmp_path: Path) -> None:
     fill(tmp_path, "a.vtk")
-    command = [mpiexec(), "-n", "3", sys.executable, "-c", BROKEN, "a.vtk", "repaired"]
+    command = [str(MPIEXEC), "-n", "3", sys.executable, "-c", BROKEN, "a.vtk", "repaired"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 1
     assert "meshfix: error: process 2: MemoryError\n" in done.stderr

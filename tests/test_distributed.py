@@ -5,11 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import shutil
 import subprocess
 import sys
 import threading
-from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,7 +16,7 @@ import generate
 import meshio
 import numpy as np
 import pytest
-from conftest import SAMPLES, tangle
+from conftest import MPIEXEC, SAMPLES, needs_mpi, tangle
 from over_ranks import METHODS
 
 pytest.importorskip(
@@ -28,12 +26,7 @@ from meshfix_cli import _kernels, mpi
 from meshfix_cli.distributed import Part, Ranks, partition, parts
 from meshfix_cli.mesh import Mesh
 
-BIN = Path(sys.executable).parent
 MESHFIX = [sys.executable, "-m", "meshfix_cli"]
-MPIEXEC = shutil.which("mpiexec", path=f"{BIN}{os.pathsep}{os.environ['PATH']}")
-needs_mpi = pytest.mark.skipif(
-    MPIEXEC is None or find_spec("mpi4py") is None, reason="there is no MPI: pip install 'meshfix-cli[mpi]' mpich"
-)
 
 
 def mpiexec(count: int, *command: object, code: int = 0, **options: Any) -> subprocess.CompletedProcess[str]:
@@ -154,7 +147,7 @@ def test_inverted_elements_that_remain_are_told_by_the_exit_code(tmp_path: Path)
 
 @needs_mpi
 def test_a_process_that_fails_in_a_sweep_ends_all() -> None:
-    done = mpiexec(3, sys.executable, "-c", FAILS, code=1)
+    done = mpiexec(3, sys.executable, "-c", FAILS, SAMPLES / "bracket_tangled.vtk", code=1)
     assert "meshfix: error: process 2: MemoryError" in done.stderr
 
 
@@ -189,12 +182,17 @@ def test_a_signal_while_an_error_is_read_ends_all(monkeypatch: pytest.MonkeyPatc
 
 
 # The command of the last process with a sweep that runs out of memory.
-FAILS = f"""
-import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})
-from over_ranks import Ranks, fail
+FAILS = """
+import sys
+from meshfix_cli.distributed import Ranks
+sweep = Ranks.sweep
+def fail(self, *rest):
+    if self.comm.rank == self.comm.size - 1:
+        raise MemoryError
+    return sweep(self, *rest)
 Ranks.sweep = fail
 from meshfix_cli.cli import main
-main(["untangle", "--mpi", "-q", "--dry-run", {str(SAMPLES / "bracket_tangled.vtk")!r}])
+main(["untangle", "--mpi", "-q", "--dry-run", sys.argv[1]])
 """
 
 
@@ -259,9 +257,9 @@ def test_a_signal_ends_all_without_a_word(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-STOPPED = f"""
-import os, signal, sys; sys.path.insert(0, {str(Path(__file__).parent)!r})
-from over_ranks import Ranks
+STOPPED = """
+import signal, sys
+from meshfix_cli.distributed import Ranks
 sweep = Ranks.sweep
 def stopped(self, *arguments):
     if self.comm.rank == 0:

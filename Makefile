@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV   := .venv
 CORES  := $(shell nproc 2>/dev/null || echo auto)
 BIN    := $(VENV)/bin
-KERNELS := $(wildcard meshfix_cli/kernels/*)
+KERNELS := $(filter %.hpp %.cpp %.txt,$(wildcard meshfix_cli/kernels/* meshfix_cli/kernels/*/*))
 
 # Where it is set, each of the hundreds of processes of the tests compiles every module anew.
 unexport PYTHONDONTWRITEBYTECODE
@@ -55,12 +55,12 @@ sanitize: ## run the kernel tests with address and undefined-behaviour sanitiser
 	LD_PRELOAD="$$(gcc -print-file-name=libasan.so) $$(gcc -print-file-name=libubsan.so)" \
 	  ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 \
 	  $(VENV)-sanitize/bin/pytest -q -p no:cacheprovider \
-	  -k "not (highs or every_case or max_move or mended or impossible or limit or global)" tests/test_kernels.py \
-	  tests/test_linear_program.py tests/test_mesh.py tests/test_obstacles.py tests/test_text.py tests/test_untangle.py
+	  -k "not (highs or every_case or max_move or mended or impossible or limit or global)" \
+	  tests/kernels tests/mesh tests/quality/test_obstacles.py tests/solve
 
 EXAMPLES ?= 5000
 fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format
-	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/test_fuzz.py
+	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/meshfile/test_fuzz.py
 
 stress: $(VENV)/installed ## untangle 259 hard cases; which are solved, how fast and how well
 	$(BIN)/python benchmarks/stress.py

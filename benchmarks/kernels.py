@@ -17,9 +17,9 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from meshfix_cli import _kernels, perturb, read, untangle
-from meshfix_cli.mesh import Mesh
-from meshfix_cli.untangle import THRESHOLD, Move
+from meshfix_cli import kernels, perturb, read, untangle
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.solve.strategies import THRESHOLD, Move
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "sample_meshes"))
 import generate
@@ -53,10 +53,10 @@ def nanoseconds(mesh: Mesh, move: Move, repeats: int) -> float:
     stars, best = mesh.topology.stars(), math.inf
     start_points, movable = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
     for _ in range(repeats):
-        points, states, visited = start_points.copy(), movable.astype(np.uint8) * _kernels.DUE, 0
+        points, states, visited = start_points.copy(), movable.astype(np.uint8) * kernels.DUE, 0
         start = time.perf_counter()
         for blocks in mesh.topology.colours:
-            visited += _kernels.relocate(
+            visited += kernels.relocate(
                 move, points, states, stars, blocks, threshold, -math.inf, start_points, math.inf, 1
             )[0]
         best = min(best, (time.perf_counter() - start) / max(visited, 1))

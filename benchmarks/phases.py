@@ -15,11 +15,13 @@ from typing import Any
 import rich.table  # noqa: F401 (the command does)
 
 import meshfix_cli.cli  # noqa: F401
-from meshfix_cli.mesh import Mesh
-from meshfix_cli.meshfile import read, write
-from meshfix_cli.obstacles import find_obstacles
-from meshfix_cli.quality import ceiling, summarise
-from meshfix_cli.untangle import SMOOTHING, untangle
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.reading import read
+from meshfix_cli.meshfile.writing import write
+from meshfix_cli.quality.obstacles import find_obstacles
+from meshfix_cli.quality.summary import ceiling, summarise
+from meshfix_cli.solve.strategies import SMOOTHING
+from meshfix_cli.solve.untangle import untangle
 
 IMPORTED = time.time()
 PHASES = ("import", "read", "topology", "untangle", "smooth", "write", "report")

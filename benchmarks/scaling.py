@@ -24,8 +24,8 @@ from process import make
 from rich.console import Console
 from rich.table import Table
 
-from meshfix_cli import _kernels, read
-from meshfix_cli.distributed import partition
+from meshfix_cli import kernels, read
+from meshfix_cli.workers.distributed import partition
 
 MPIEXEC = shutil.which("mpiexec", path=str(Path(sys.executable).parent)) or "mpiexec"
 LATENCY, BANDWIDTH = 2e-6, 10e9  # assumed: seconds a message, bytes a second
@@ -36,7 +36,7 @@ SWEEPS = {"Laplacian": 7, "smoothing": 3}  # of the prediction: those of a milli
 def waiting(path: Path, ranks: int) -> float:
     """Return how much longer sweeps take because processes have unlike numbers of corners in a colour."""
     stars = read(path, threads=2).mesh.topology.stars(2)
-    work = np.diff(stars.offsets[:: _kernels.BLOCK_SIZE], append=len(stars.corners))
+    work = np.diff(stars.offsets[:: kernels.BLOCK_SIZE], append=len(stars.corners))
     of_block = partition(stars, ranks)
     colours = np.split(stars.colour_blocks, stars.colour_offsets[1:-1])
     longest = sum(np.bincount(of_block[c], weights=work[c], minlength=ranks).max() for c in colours)

@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli import Mesh, perturb, summarise, untangle
-from meshfix_cli.untangle import STRATEGIES
+from meshfix_cli.solve.strategies import STRATEGIES
 
 PERTURBATIONS = ((5, 1), (10, 1), (25, 1), (50, 2), (100, 1), (25, 8), (100, 8), (100, 32), (100, 100))
 SOLVED, IMPOSSIBLE, FAILED, WRONG = "solved", "impossible", "failed", "wrong"

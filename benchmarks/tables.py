@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli import Mesh, perturb, read, summarise, untangle
-from meshfix_cli.report import history_csv
-from meshfix_cli.untangle import Outcome
+from meshfix_cli.report.as_json import history_csv
+from meshfix_cli.solve.records import Outcome
 
 CASES = ((5, 1), (10, 1), (25, 1), (50, 1), (25, 2), (25, 4), (25, 8))  # percent, multiples of h
 

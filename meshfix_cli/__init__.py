@@ -11,20 +11,29 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# The two functions are named as their modules are, which import nothing heavy.
-from meshfix_cli.perturb import perturb
-from meshfix_cli.untangle import untangle
-
 if TYPE_CHECKING:
-    from meshfix_cli.mesh import Mesh
-    from meshfix_cli.meshfile import Document, read, write
-    from meshfix_cli.quality import summarise
+    from meshfix_cli.mesh.mesh import Mesh
+    from meshfix_cli.meshfile.document import Document
+    from meshfix_cli.meshfile.reading import read
+    from meshfix_cli.meshfile.writing import write
+    from meshfix_cli.quality.summary import summarise
+    from meshfix_cli.solve.perturb import perturb
+    from meshfix_cli.solve.untangle import untangle
 
 __version__ = "0.1.0"
 
 __all__ = ["Document", "Mesh", "perturb", "read", "summarise", "untangle", "write"]
 
-_HOME = {"Document": "meshfile", "Mesh": "mesh", "read": "meshfile", "summarise": "quality", "write": "meshfile"}
+# Where the names are at home; a module is imported when one of its names is asked for.
+_HOME = {
+    "Document": "meshfile.document",
+    "Mesh": "mesh.mesh",
+    "perturb": "solve.perturb",
+    "read": "meshfile.reading",
+    "summarise": "quality.summary",
+    "untangle": "solve.untangle",
+    "write": "meshfile.writing",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -12,18 +12,19 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from meshfix_cli.errors import WriteError
-from meshfix_cli.perturb import Distance
-from meshfix_cli.untangle import SMOOTH, collect, plan, steps
+from meshfix_cli.solve.perturb import Distance
+from meshfix_cli.solve.strategies import SMOOTH, plan
 
 if TYPE_CHECKING:
-    from meshfix_cli.mesh import Mesh
-    from meshfix_cli.meshfile import Document, Put
+    from meshfix_cli.mesh.mesh import Mesh
+    from meshfix_cli.meshfile.document import Document
     from meshfix_cli.meshfile.formats import Format
-    from meshfix_cli.obstacles import Obstacles
-    from meshfix_cli.quality import Requirement
-    from meshfix_cli.report import Report
-    from meshfix_cli.team import Team
-    from meshfix_cli.untangle import Outcome, SweepRecord
+    from meshfix_cli.meshfile.writing import Put
+    from meshfix_cli.quality.obstacles import Obstacles
+    from meshfix_cli.quality.requirement import Requirement
+    from meshfix_cli.report.facts import Report
+    from meshfix_cli.solve.records import Outcome, SweepRecord
+    from meshfix_cli.solve.team import Team
 
     Steps = Iterator[tuple[Mesh, SweepRecord]]
 
@@ -37,7 +38,7 @@ class Held:
 
     def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
         """Read a mesh; the errors are those of `meshfile.read`."""
-        from meshfix_cli.meshfile import read
+        from meshfix_cli.meshfile.reading import read
 
         return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation, threads=threads)
 
@@ -61,7 +62,8 @@ class Files:
         ------
         ReadError, InvalidMeshError, WriteError
         """
-        from meshfix_cli.meshfile import check_pieces, check_target, output_format
+        from meshfix_cli.meshfile.atomic import check_target
+        from meshfix_cli.meshfile.writing import check_pieces, output_format
 
         if not self.dry_run:
             check_target(self.target)
@@ -78,7 +80,7 @@ class Files:
         self, document: Document, mesh: Mesh, output: Format, put: Put | None = None
     ) -> tuple[Mesh, tuple[str, ...]]:
         """Write a moved mesh; return it as the file holds it, and what the user should know."""
-        from meshfix_cli.meshfile import write
+        from meshfix_cli.meshfile.writing import write
 
         if self.dry_run:
             return document.as_stored(mesh), ()
@@ -108,6 +110,8 @@ class Method:
 
     def steps(self, mesh: Mesh, reach: float, threads: int, team: Team | None = None) -> Steps:
         """Run the phases, see `untangle.steps`."""
+        from meshfix_cli.solve.untangle import steps
+
         return steps(
             mesh, plan(self.strategy, self.smooth), sweeps=self.sweeps, threshold=self.threshold, max_move=reach,
             only_invalid=self.only_invalid, threads=threads, team=team,
@@ -115,6 +119,8 @@ class Method:
 
     def solve(self, mesh: Mesh, reach: float, threads: int, watch: Callable[[Steps], Steps] = iter) -> Outcome:
         """Run them to the end; `watch` passes the steps through, to show them."""
+        from meshfix_cli.solve.untangle import collect
+
         return collect(watch(self.steps(mesh, reach, threads)), threads)
 
 
@@ -125,7 +131,7 @@ class Judge:
     Attributes
     ----------
     metrics : tuple of str
-        Keys of `quality.METRICS`.
+        Keys of `metrics.METRICS`.
     requirements : tuple of Requirement
     threads : int
     brief : bool
@@ -147,9 +153,9 @@ class Judge:
         **more: Any,
     ) -> Report:
         """Summarise the stages of a mesh, of which the last is the result."""
-        from meshfix_cli.obstacles import find_obstacles
-        from meshfix_cli.quality import ceiling, summarise
-        from meshfix_cli.report import Report
+        from meshfix_cli.quality.obstacles import find_obstacles
+        from meshfix_cli.quality.summary import ceiling, summarise
+        from meshfix_cli.report.facts import Report
 
         result = list(stages.values())[-1]
         shown = list(stages)[-1:] if self.brief else list(stages)  # nobody sees the others
@@ -199,7 +205,7 @@ def repair(
     WriteError, InvalidMeshError
         Nothing was written.
     """
-    from meshfix_cli.quality import displacement
+    from meshfix_cli.quality.summary import displacement
 
     threads = judge.threads
     reach = method.reach(document.mesh, threads)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from meshfix_cli.mesh import Mesh
-from meshfix_cli.perturb import perturb
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.solve.perturb import perturb
 
 Points = NDArray[np.float64]
 Simplices = NDArray[np.int32]

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli import _kernels
+from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError
-from meshfix_cli.mesh import CELL_NAMES, LARGEST_COORDINATE, Mesh, Topology
+from meshfix_cli.mesh.elements import SIMPLICES, Element, dimension_of, solved_among
+from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
+from meshfix_cli.mesh.topology import Topology
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
-from meshfix_cli.meshfile.source import SIMPLEX, Cells, Source
+from meshfix_cli.meshfile.source import Cells, Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Document:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
         original = self.source.points
         points: NDArray[np.floating[Any]] = original.copy()
-        moved = _kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & mesh.topology.used
+        moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & mesh.topology.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
                 points[moved] = mesh.points[moved]
@@ -125,7 +127,8 @@ class Document:
 
 def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None, threads: int = 1) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
-    dimension = _dimension(source)
+    element = _solved(source)
+    dimension = element.shape.dimension
     if regions is not None:
         source = _with_regions(source, regions)
     starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
@@ -175,26 +178,24 @@ def with_reversed(source: Source, rows: Mapping[int, NDArray[np.int64]]) -> Sour
     return replace(source, cells=cells)
 
 
-def _dimension(source: Source) -> int:
-    """3 where there are tetrahedra, 2 where triangles are the cells of the highest dimension."""
-    runs = [run for run in source.cells if len(run.vertices)]
-    types = {run.type for run in runs}
-    if "tetra" in types:
-        return 3
-    solid = sorted({run.type for run in runs if run.solid})
-    if "triangle" in types and not solid:
-        return 2
+def _solved(source: Source) -> Element:
+    """Return the type that is solved for: no cell may be of a higher dimension."""
+    types = {run.type for run in source.cells if len(run.vertices)}
+    element, highest = solved_among(types), max(map(dimension_of, types), default=0)
+    if element is not None and element.shape.dimension == highest:
+        return element
+    solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
     raise ReadError(f"there are no tetrahedra and no plane mesh of triangles in it (cells: {found})")
 
 
 def _runs_of_simplices(source: Source, dimension: int) -> list[int]:
-    return [i for i, run in enumerate(source.cells) if run.type == SIMPLEX[dimension]]
+    return [i for i, run in enumerate(source.cells) if run.type == SIMPLICES[dimension].key]
 
 
 def _all_simplices(source: Source, dimension: int) -> NDArray[np.int64]:
     """(k, d+1), in the order of the file, repetitions included."""
-    return source.vertices_of(SIMPLEX[dimension], dimension + 1)
+    return source.vertices_of(SIMPLICES[dimension].key, dimension + 1)
 
 
 def _ids(run: Cells, start: int) -> NDArray[np.int64]:
@@ -280,7 +281,8 @@ def _with_regions(source: Source, name: str) -> Source:
 
 
 def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
-    topology, (one, many) = mesh.topology, CELL_NAMES[mesh.dimension]
+    topology, shape = mesh.topology, mesh.topology.element.shape
+    one, many = shape.name, shape.plural
     notes = []
     if topology.m < rows:
         repeated = counted(rows - topology.m, f"{one} is a repetition", f"{many} are repetitions")

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 HEAD = 4096  # bytes that are enough to recognise a format
 
-# Formats that a module of this package, of the same name, reads and writes back: meshio's names of the readers.
-OWN = ("abaqus", "gmsh", "medit", "obj", "ply", "stl", "vtk", "vtu")
-# Extensions that need not be looked up. `.msh` is gmsh's, whatever meshio's default is; a file that becomes one is of
-# version 2.2, in which each element has its group: meshio's writer of 4.1 has one for each run of them.
-_EXTENSIONS = {f".{name}": name for name in ("obj", "ply", "stl", "vtk", "vtu")} | {
-    ".inp": "abaqus",
-    ".mesh": "medit",
-    ".msh": "gmsh22",
-    ".pvtu": "pvtu",
-}
 ENDLESS = ("tecplot", "wkt")  # meshio reads truncated files of these for ever
 BOTH = ("gmsh", "gmsh22", "ply", "stl", "vtk", "vtk42", "vtu")  # written as text or binary
 
@@ -38,40 +29,109 @@ class Format:
 PARTS = Format("gmsh parts")  # several files of gmsh
 
 
-def sniff(data: bytes) -> Format | None:
-    """Recognise a format by the first bytes of a file; None: unknown."""
+@dataclass(frozen=True)
+class Own:
+    """A format that a module of this package reads and writes back.
+
+    Attributes
+    ----------
+    module : str
+        In `meshfix_cli.meshfile`; its docstring tells how the coordinates lie.
+    recognise : callable
+        (all bytes, the first of them as text without blanks in front) -> Format, or None where it is not this.
+    extensions : dict
+        The name of the `Format` that a file with this extension becomes.
+    """
+
+    module: str
+    recognise: Callable[[bytes, str], Format | None]
+    extensions: Mapping[str, str]
+
+
+def _abaqus(_: bytes, text: str) -> Format | None:
+    return Format("abaqus") if re.match(r"\*(\*| *[A-Za-z]{3})", text) else None
+
+
+def _gmsh(_: bytes, text: str) -> Format | None:
+    if "$MeshFormat" not in text:
+        return None
+    fields = text.split("$MeshFormat", 1)[1].split()
+    return Format("gmsh22" if fields[:1] and fields[0].startswith("2") else "gmsh", fields[1:2] == ["1"])
+
+
+def _medit(_: bytes, text: str) -> Format | None:
+    return Format("medit") if re.match(r"(#.*\n\s*)*MeshVersionFormatted\b", text) else None
+
+
+def _obj(_: bytes, text: str) -> Format | None:
+    vertices = re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE)
+    return Format("obj") if vertices and re.match(r"(#|[ogsv] |mtllib |usemtl )", text) else None
+
+
+def _ply(_: bytes, text: str) -> Format | None:
+    return Format("ply", "format ascii" not in text) if text.startswith("ply") else None
+
+
+def _stl(data: bytes, text: str) -> Format | None:
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
         return Format("stl", True)
-    head = data[:HEAD]
-    text = head.decode("latin-1").lstrip("\ufeff\xef\xbb\xbf \t\r\n")
-    if text.startswith("# vtk DataFile"):
-        version = re.match(r"# vtk DataFile Version (\d+)", text)
-        old = version is not None and int(version[1]) < 5
-        lines = text.split("\n", 3) if "\n" in text else text.split("\r", 3)
-        return Format("vtk42" if old else "vtk", len(lines) > 2 and lines[2].strip().upper() == "BINARY")
-    if "$MeshFormat" in text:
-        fields = text.split("$MeshFormat", 1)[1].split()
-        return Format("gmsh22" if fields[:1] and fields[0].startswith("2") else "gmsh", fields[1:2] == ["1"])
-    if text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin")):
-        if re.search(r"<VTKFile[^>]*\stype\s*=\s*[\"']PUnstructuredGrid", text):
-            return Format("pvtu")
-        if re.search(r"<VTKFile[^>]*\stype\s*=\s*[\"']UnstructuredGrid", text):
-            return Format("vtu", re.search(r"format\s*=\s*[\"']ascii", text) is None)
+    return Format("stl", False) if re.match(r"solid\b.*\bfacet\b", text, re.IGNORECASE | re.DOTALL) else None
+
+
+def _vtk(_: bytes, text: str) -> Format | None:
+    if not text.startswith("# vtk DataFile"):
+        return None
+    version = re.match(r"# vtk DataFile Version (\d+)", text)
+    old = version is not None and int(version[1]) < 5
+    lines = text.split("\n", 3) if "\n" in text else text.split("\r", 3)
+    return Format("vtk42" if old else "vtk", len(lines) > 2 and lines[2].strip().upper() == "BINARY")
+
+
+def _vtk_xml(text: str, kind: str) -> bool:
+    return re.search(rf"<VTKFile[^>]*\stype\s*=\s*[\"']{kind}", text) is not None
+
+
+def _vtu(_: bytes, text: str) -> Format | None:
+    if not (_is_xml(text) and _vtk_xml(text, "UnstructuredGrid")):
+        return None
+    return Format("vtu", re.search(r"format\s*=\s*[\"']ascii", text) is None)
+
+
+def _pvtu(_: bytes, text: str) -> Format | None:
+    return Format("pvtu") if _is_xml(text) and _vtk_xml(text, "PUnstructuredGrid") else None
+
+
+def _is_xml(text: str) -> bool:
+    return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin"))
+
+
+# By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
+# in which each element has its group: meshio's writer of 4.1 has one for each run of them.
+OWN = {
+    "stl": Own("stl", _stl, {".stl": "stl"}),
+    "vtk": Own("vtk.legacy", _vtk, {".vtk": "vtk"}),
+    "gmsh": Own("gmsh", _gmsh, {".msh": "gmsh22"}),
+    "pvtu": Own("vtk.pvtu", _pvtu, {".pvtu": "pvtu"}),
+    "vtu": Own("vtk.vtu", _vtu, {".vtu": "vtu"}),
+    "ply": Own("ply", _ply, {".ply": "ply"}),
+    "medit": Own("medit", _medit, {".mesh": "medit"}),
+    "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}),
+    "obj": Own("obj", _obj, {".obj": "obj"}),
+}
+
+
+def sniff(data: bytes) -> Format | None:
+    """Recognise a format by the first bytes of a file; None: unknown."""
+    text = data[:HEAD].decode("latin-1").lstrip("\ufeff\xef\xbb\xbf \t\r\n")
+    found = (own.recognise(data, text) for own in OWN.values())
+    return next((form for form in found if form is not None), None) or _of_meshio(text)
+
+
+def _of_meshio(text: str) -> Format | None:
+    """Recognise what only meshio reads."""
+    if _is_xml(text):
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
-    if text.startswith("ply"):
-        return Format("ply", "format ascii" not in text)
-    if re.match(r"solid\b.*\bfacet\b", text, re.IGNORECASE | re.DOTALL):
-        return Format("stl", False)
-    if re.match(r"(#.*\n\s*)*MeshVersionFormatted\b", text):
-        return Format("medit")
-    for start, name in (("OFF", "off"), ("NDIME", "su2")):
-        if text.startswith(start):
-            return Format(name)
-    if re.match(r"\*(\*| *[A-Za-z]{3})", text):
-        return Format("abaqus")
-    if re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE) and re.match(r"(#|[ogsv] |mtllib |usemtl )", text):
-        return Format("obj")
-    return None
+    return Format("off") if text.startswith("OFF") else Format("su2") if text.startswith("NDIME") else None
 
 
 def missing_part(data: bytes, form: Format, cells: int) -> str | None:
@@ -94,8 +154,9 @@ def missing_part(data: bytes, form: Format, cells: int) -> str | None:
 def by_name(path: Path) -> Format | None:
     """Recognise a format by the extension; None: unknown."""
     suffix = path.suffix.lower()
-    if suffix in _EXTENSIONS:
-        return Format(_EXTENSIONS[suffix])
+    for own in OWN.values():
+        if suffix in own.extensions:
+            return Format(own.extensions[suffix])
     import meshio
 
     names = [name for name in meshio.extension_to_filetypes.get(suffix, []) if name not in ENDLESS]

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh import Mesh
-from meshfix_cli.meshfile.source import SIMPLEX, Cells, ghost_vertices
+from meshfix_cli.mesh.elements import solved_among
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.source import Cells, ghost_vertices
 from meshfix_cli.meshfile.splice import Points
 
 Int64 = NDArray[np.int64]
@@ -136,15 +137,17 @@ def _on_interfaces(copies: Copies, threads: int) -> tuple[Mask, Mask]:
 
     The first are on the boundary of the simplices that a piece has for itself, on other cells, or on ghosts.
     """
-    dimension = 3 if any(run.type == SIMPLEX[3] and len(run.vertices) for run in copies.cells) else 2
-    simplices = [run for run in copies.cells if run.type == SIMPLEX[dimension]]
-    others = [run for run in copies.cells if run.type != SIMPLEX[dimension]]
+    element = solved_among(run.type for run in copies.cells if len(run.vertices))
+    simplices = [run for run in copies.cells if element is not None and run.type == element.key]
+    others = [run for run in copies.cells if element is None or run.type != element.key]
     own = [run.vertices if run.ghosts is None else run.vertices[~run.ghosts] for run in simplices]
     members = copies.of_cells(others)
     mine = np.zeros_like(members)
-    if sum(map(len, own)):
+    if element is not None and any(len(rows) for rows in own):
         # Where they are does not matter here, so a plane in space may be seen from any side.
-        topology = Mesh.build(copies.points[:, :dimension], np.concatenate(own), threads=threads).topology
+        topology = Mesh.build(
+            copies.points[:, : element.shape.dimension], np.concatenate(own), threads=threads
+        ).topology
         members |= topology.boundary
         mine = topology.used
     ghosts = ghost_vertices(simplices, len(members))

@@ -5,53 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.atomic import check_target, is_stream
-from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.joining import Copies, Int64, by_numbers, by_place, joined
-from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices
+from meshfix_cli.meshfile.source import Arrays, Cells, Family, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import Points, differing
-
-
-class Family(Protocol):
-    """The files of one mesh, and what they are called."""
-
-    @property
-    def form(self) -> Format:
-        """The format of all of them together."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """The pieces, as a user knows them."""
-
-    @property
-    def paths(self) -> Sequence[Path]:
-        """Where the pieces are."""
-
-    @property
-    def numbers(self) -> str:
-        """What the numbers are called by which points are joined."""
-
-    @property
-    def by_position(self) -> bool:
-        """Whether cells are named by their position among those of all pieces; else they have numbers of their own."""
-
-    def parse(self, contents: Sequence[bytes]) -> list[Source]:
-        """Read the pieces."""
-
-    def promoted(self, contents: Sequence[bytes]) -> tuple[Family, list[bytes]]:
-        """Return the pieces with coordinates in float64, and the family that they make."""
-
-    def targets(self, target: str) -> list[str]:
-        """Return where the pieces of an output go; WriteError where that cannot be."""
-
-    def beside(self, target: str, targets: Sequence[str]) -> list[tuple[str, bytes]]:
-        """Return the names and contents of what is written beside the pieces."""
 
 
 class _Origin(NamedTuple):
@@ -63,8 +26,8 @@ class _Origin(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
-    """The layout of a mesh that lies in several files.
+class Joined:
+    """The layout of a mesh that lies in several files; see `source.Pieces`.
 
     Attributes
     ----------
@@ -155,7 +118,7 @@ def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:
         held=ghost_vertices(cells, len(chosen)),
         untold=_distinct(source.untold for source in sources),
         notes=(note, *_distinct(source.notes for source in sources)),
-        pieces=Pieces(family, sources, np.split(rows, starts[1:-1]), origins),
+        pieces=Joined(family, sources, np.split(rows, starts[1:-1]), origins),
     )
 
 

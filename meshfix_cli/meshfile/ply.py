@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli import _kernels
+from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply, pairs
@@ -150,7 +150,7 @@ class _Text:
 
     def __init__(self, data: bytes, at: int) -> None:
         self.data = data
-        self.spans = _kernels.find_words(data, at, len(data))
+        self.spans = kernels.find_words(data, at, len(data))
         raw = np.frombuffer(data, dtype=np.uint8)
         breaks = np.flatnonzero((raw == ord("\n")) | (raw == ord("\r")))
         starts = np.searchsorted(self.spans[:, 0], breaks[np.searchsorted(breaks, at) :])

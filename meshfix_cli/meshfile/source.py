@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate
-from typing import TYPE_CHECKING, Any, Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.splice import Points
-
-if TYPE_CHECKING:
-    from meshfix_cli.meshfile.pieces import Pieces
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
 REGIONS = (
     "gmsh:physical", "gmsh:physical_set", "medit:ref", "cell_tags", "abaqus:section", "obj:material", "stl:solid",
     "MaterialIDs", "CellEntityIds", "RegionId",
 )  # fmt: skip
-
-
-SIMPLEX = {2: "triangle", 3: "tetra"}  # what is solved for, by its dimension
-_SOLID = re.compile(r"(?:VTK_[A-Z]+_)?(?:tetra|hexa|wedge|pyramid|penta|voxel|polyhedron)", re.IGNORECASE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +29,7 @@ class Cells:
     Attributes
     ----------
     type : str
-        In meshio's words: "triangle", "tetra", "line", "triangle6", ...
+        A key of `elements.ELEMENTS`, or a name of the same kind: "triangle", "tetra", "line", "triangle6", ...
     vertices : (m, k) int
         Rows of the points; a list of arrays where the cells have different numbers of vertices.
     ids : (m,) int64 or None
@@ -48,11 +42,6 @@ class Cells:
     vertices: Any
     ids: NDArray[np.int64] | None = None
     ghosts: NDArray[np.bool_] | None = None
-
-    @property
-    def solid(self) -> bool:
-        """Whether the cells fill a volume."""
-        return _SOLID.match(self.type) is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +80,64 @@ class Layout(Protocol):
 
     def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
         """Return the file with other points (n, d), and with the first two vertices of some cells exchanged."""
+
+
+class Family(Protocol):
+    """The files of one mesh, and what they are called."""
+
+    @property
+    def form(self) -> Format:
+        """The format of all of them together."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """The pieces, as a user knows them."""
+
+    @property
+    def paths(self) -> Sequence[Path]:
+        """Where the pieces are."""
+
+    @property
+    def numbers(self) -> str:
+        """What the numbers are called by which points are joined."""
+
+    @property
+    def by_position(self) -> bool:
+        """Whether cells are named by their position among those of all pieces; else they have numbers of their own."""
+
+    def parse(self, contents: Sequence[bytes]) -> list[Source]:
+        """Read the pieces."""
+
+    def promoted(self, contents: Sequence[bytes]) -> tuple[Family, list[bytes]]:
+        """Return the pieces with coordinates in float64, and the family that they make."""
+
+    def targets(self, target: str) -> list[str]:
+        """Return where the pieces of an output go; WriteError where that cannot be."""
+
+    def beside(self, target: str, targets: Sequence[str]) -> list[tuple[str, bytes]]:
+        """Return the names and contents of what is written beside the pieces."""
+
+
+class Pieces(Protocol):
+    """What stands for the layout of a mesh that lies in several files; see `pieces.Joined`."""
+
+    @property
+    def family(self) -> Family:
+        """The files."""
+
+    def rounded(self, points: Points) -> Points:
+        """Return points (n, d) as the pieces can hold them."""
+
+    def rewritten(
+        self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]
+    ) -> Iterable[bytes]:
+        """Give each piece with other points (n, d) of the mesh, and the first two vertices of some cells exchanged."""
+
+    def files(self, target: str, original: Points, points: Points) -> Iterator[tuple[str, bytes]]:
+        """Give names and contents of all files of an output, what names the pieces last."""
+
+    def check(self, target: str, kept: bool) -> None:
+        """Raise WriteError where an output, in the same format if `kept`, cannot be or would replace a piece."""
 
 
 @dataclass(frozen=True, eq=False)

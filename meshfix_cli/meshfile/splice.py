@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli import _kernels
+from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.text import Spans, numbers_at
 
@@ -110,7 +110,7 @@ class Places:
     def _encode(self, values: Points) -> tuple[bytes, Spans]:
         if self.end is None:
             return values.astype(self.dtype).tobytes(), pairs(np.arange(len(values) + 1) * self.dtype.itemsize)
-        return _kernels.shortest(values.astype(np.float64), self.dtype.itemsize == 4, self.longest)
+        return kernels.shortest(values.astype(np.float64), self.dtype.itemsize == 4, self.longest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,12 +162,12 @@ def differing(original: Points, points: Points) -> NDArray[np.bool_]:
 def apply(data: bytes, edits: Sequence[Edits]) -> bytes:
     """Return the data with all edits made; they may come in any order."""
     if len(edits) == 1 and (np.diff(edits[0].spans[:, 0]) >= 0).all():  # as most files have it
-        return _kernels.replace(data, edits[0].spans, edits[0].words, edits[0].word_spans)
+        return kernels.replace(data, edits[0].spans, edits[0].words, edits[0].word_spans)
     starts = np.cumsum([0, *(len(edit.words) for edit in edits)])
     spans = np.concatenate([edit.spans for edit in edits])
     word_spans = np.concatenate([edit.word_spans + start for edit, start in zip(edits, starts, strict=False)])
     order = np.argsort(spans[:, 0], kind="stable")
-    return _kernels.replace(data, spans[order], b"".join(edit.words for edit in edits), word_spans[order])
+    return kernels.replace(data, spans[order], b"".join(edit.words for edit in edits), word_spans[order])
 
 
 def pairs(offsets: NDArray[np.int64]) -> Spans:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from meshfix_cli import _kernels
+from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 
 Spans = NDArray[np.int64]  # (..., 2): the offset of the first byte of a word, and the offset behind its last
@@ -21,7 +21,7 @@ def words(data: bytes, at: int, count: int) -> Spans:
     ReadError
         The file ends before.
     """
-    spans = _kernels.find_words(data, at, count)
+    spans = kernels.find_words(data, at, count)
     if len(spans) < count:
         raise in_line(data, at, f"{count:,} numbers are announced, and the file is truncated")
     return spans
@@ -30,7 +30,7 @@ def words(data: bytes, at: int, count: int) -> Spans:
 def line_words(data: bytes, offsets: ArrayLike, count: int) -> Spans:
     """Return the spans (k, count, 2) of the first words from each offset (k,) to the end of its line; -1: none."""
     at = np.ascontiguousarray(offsets, dtype=np.int64)
-    return _kernels.line_words(data, at, count).reshape(len(at), count, 2)
+    return kernels.line_words(data, at, count).reshape(len(at), count, 2)
 
 
 def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:
@@ -55,7 +55,7 @@ def integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int64], int]:
 
 def short_integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int32] | NDArray[np.int64], int]:
     """Do the same, in 32 bits where these are enough."""
-    values, end, bad = _kernels.scan_integers(data, at, count)
+    values, end, bad = kernels.scan_integers(data, at, count)
     if bad >= 0:
         raise _not_a_number(data, bad, "an integer")
     return values, end
@@ -63,13 +63,13 @@ def short_integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int32] 
 
 def behind_words(data: bytes, at: int, count: int) -> int:
     """Return the offset behind the next words; -1: there are fewer."""
-    return _kernels.behind_words(data, at, count)
+    return kernels.behind_words(data, at, count)
 
 
 def integers_at(data: bytes, spans: Spans, slash: bool = False) -> NDArray[np.int64]:
     """Return the integers (...) of words, if `slash` up to one; ReadError where one is not an integer."""
     flat = np.ascontiguousarray(spans.reshape(-1, 2))
-    values, bad = _kernels.integers(data, flat, slash)
+    values, bad = kernels.integers(data, flat, slash)
     if bad >= 0:
         raise _not_a_number(data, int(flat[bad, 0]), "an integer")
     return values.reshape(spans.shape[:-1])
@@ -78,7 +78,7 @@ def integers_at(data: bytes, spans: Spans, slash: bool = False) -> NDArray[np.in
 def numbers_at(data: bytes, spans: Spans, dtype: np.dtype[Any]) -> NDArray[np.floating[Any]]:
     """Return the numbers (...) of words, in float32 or float64; ReadError where one is not a number."""
     flat = np.ascontiguousarray(spans.reshape(-1, 2))
-    values, bad = _kernels.numbers(data, flat, dtype.itemsize == 4)
+    values, bad = kernels.numbers(data, flat, dtype.itemsize == 4)
     if bad >= 0:
         raise _not_a_number(data, int(flat[bad, 0]), "a number")
     return values.reshape(spans.shape[:-1]).astype(dtype, copy=False)

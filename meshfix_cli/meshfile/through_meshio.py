@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
+from meshfix_cli.mesh.elements import ELEMENTS, solved_among
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
-_COMMON = frozenset({"line", "triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"})
+_COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.facets) & _KNOWN
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _WITH_SETS = ("abaqus", "exodus")
@@ -44,8 +45,9 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
 
 def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
     """Write as much of a source, with other points (n, d), as the format takes; WriteError where that is nothing."""
-    simplex = "tetra" if any(run.type == "tetra" for run in source.cells) else "triangle"
-    attempts = [(_KNOWN, source.arrays), (_COMMON, source.arrays), ({simplex}, source.arrays), ({simplex}, Arrays())]
+    element = solved_among(run.type for run in source.cells)
+    solved = {element.key} if element else set()
+    attempts = [(_KNOWN, source.arrays), (_COMMON, source.arrays), (solved, source.arrays), (solved, Arrays())]
     if form.name in _SPATIAL and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     for types, arrays in attempts:

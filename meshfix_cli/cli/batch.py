@@ -1,0 +1,230 @@
+"""`meshfix batch`."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from meshfix_cli.cli.files import check_input, check_other
+from meshfix_cli.cli.options import (
+    Show,
+    allowing,
+    holding,
+    packed,
+    requiring,
+    showing,
+    solving,
+    storing,
+)
+from meshfix_cli.cli.process import SOME_FAILED, VALID, abort_all, complain, cores, find_processes, others
+from meshfix_cli.errors import WriteError
+from meshfix_cli.repair import Files, Held, Judge, Method
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from meshfix_cli.quality.requirement import Requirement
+    from meshfix_cli.workers.batch import Result
+
+
+EXECUTORS = ("processes", "mpi", "dask")
+
+
+class _Shard(click.ParamType):  # type: ignore[type-arg]
+    name = "I/N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if isinstance(value, slice):
+            return value
+        which, slash, count = value.partition("/")
+        if slash and which.isdecimal() and count.isdecimal() and 1 <= int(which) <= int(count):
+            return slice(int(which) - 1, None, int(count))
+        return self.fail(f"{value!r} is not such as 1/8, the first of eight parts", param, ctx)
+
+
+@dataclass(frozen=True)
+class _Listed:
+    """Which files are repaired, and what is kept of them."""
+
+    sources: tuple[str, ...]
+    files_from: str | None
+    shard: slice | None
+    output_dir: str
+    report: str | None
+
+    def pairs(self, *, absolute: bool) -> list[tuple[str, str]]:
+        """Inputs and outputs, checked before any work."""
+        from meshfix_cli.workers.batch import distinct, expanded, named_in, outputs
+
+        if self.report is not None and Path(self.report).suffix.lower() in (".html", ".htm"):
+            raise click.UsageError(f"{self.report}: the report on many meshes is JSON")
+        if self.files_from is not None:
+            check_input(self.files_from)
+        try:
+            names = [*expanded(self.sources), *(named_in(self.files_from) if self.files_from is not None else ())]
+            sources = distinct(os.path.abspath(name) if absolute else name for name in names)  # noqa: PTH100
+            folder = os.path.abspath(self.output_dir) if absolute else self.output_dir  # noqa: PTH100
+            pairs = list(zip(sources, outputs(sources, folder, self.report), strict=True))
+        except ValueError as error:
+            raise click.UsageError(str(error)) from error
+        if not pairs:
+            raise click.UsageError("there is no IN; name files, or use --files-from")
+        _make_folder(folder)
+        if self.report is not None:
+            check_other(self.report)
+        return pairs[self.shard or slice(None)]
+
+
+def _make_folder(folder: str) -> None:
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        what = "is not a folder" if Path(folder).exists() else f"cannot be made: {error.strerror}"
+        raise WriteError(f"{folder}: {what}") from error
+    if not os.access(folder, os.W_OK):
+        raise WriteError(f"{folder}: is not writable")
+
+
+@dataclass(frozen=True)
+class _Run:
+    """Where the work is done."""
+
+    executor: str
+    scheduler_file: str | None
+    jobs: int | None
+
+    @contextmanager
+    def workers(self) -> Iterator[tuple[Executor | None, int]]:
+        """An executor, None in a process that has worked for another, and how many files it has at once."""
+        if (self.executor == "dask") != (self.scheduler_file is not None):
+            raise click.UsageError("--executor dask and --scheduler-file go together")
+        if self.executor == "processes":
+            from meshfix_cli.workers.batch import Pool
+
+            jobs = self.jobs or cores()
+            with Pool(jobs) as pool:
+                yield pool, jobs
+            return
+        with self._cluster() as (executor, count):
+            if count == 0:
+                click.echo("meshfix: there is no worker yet; waiting for the first", err=True)
+            yield executor, self.jobs or 2 * max(1, count)  # one that is worked on, and one that is on its way
+
+    def _cluster(self) -> AbstractContextManager[tuple[Executor | None, int]]:
+        if self.scheduler_file is not None:
+            from meshfix_cli.workers import dask
+
+            return dask.workers(self.scheduler_file)
+        from meshfix_cli.workers import mpi
+
+        return mpi.workers(find_processes(), abort_all)
+
+
+_listing = packed(
+    "listed",
+    _Listed,
+    click.argument("sources", metavar="[IN]...", nargs=-1),
+    click.option("--output-dir", metavar="DIR", required=True, help="Outputs go here, under the names of the inputs."),
+    click.option("--files-from", metavar="FILE|-", help="Read names of more inputs, one a line."),
+    click.option("--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),
+    click.option("--report", metavar="FILE", help="Write the options, and each mesh before and after, as JSON."),
+)
+_running = packed(
+    "where",
+    _Run,
+    click.option(
+        "--executor",
+        type=click.Choice(EXECUTORS),
+        default=EXECUTORS[0],
+        show_default=True,
+        help="Processes on this machine, those that mpiexec has started, or the workers of a Dask cluster.",
+    ),
+    click.option("--scheduler-file", metavar="FILE", help="Of the Dask cluster."),
+    click.option(
+        "--jobs",
+        type=click.IntRange(1, 1024),
+        help="Files at once, each on one thread. [default: a process for each core; of a cluster twice its workers]",
+    ),
+)
+
+
+@click.command()
+@_listing
+@_running
+@click.option("--resume", is_flag=True, help="Skip a file whose output is not older, and valid.")
+@storing
+@solving
+@allowing
+@requiring
+@holding
+@showing
+def batch(
+    listed: _Listed,
+    where: _Run,
+    resume: bool,
+    files: Files,
+    method: Method,
+    allow_inverted: bool,
+    requirements: tuple[Requirement, ...],
+    held: Held,
+    show: Show,
+) -> None:
+    """Untangle many meshes at once, each into the file of its name in another folder.
+
+    IN is a file or a quoted pattern such as 'run*/**/*.vtk'. A bad file costs only itself. Prints a line for each as
+    it is done, then a summary. Exits with 0 where all are valid, and with 4 where some are not or failed.
+    """
+    from meshfix_cli.meshfile.atomic import write_text
+    from meshfix_cli.report.as_json import batch_json
+    from meshfix_cli.report.facts import kept
+    from meshfix_cli.workers.batch import Task, run
+
+    others.add("workers")
+    with where.workers() as (executor, in_flight):
+        if executor is None:
+            return
+        pairs = listed.pairs(absolute=where.executor == "dask")
+        judge = Judge(show.metrics, requirements, brief=show.quiet and listed.report is None)
+        task = Task(files, held, method, judge, resume)
+        passed, done = True, {}
+        try:
+            for result in _told(run(executor, (task.at(*pair) for pair in pairs), in_flight), len(pairs), show):
+                passed &= _passes(result, allow_inverted)
+                if listed.report is not None:
+                    done[result["file"]] = kept(result)
+        finally:  # also where the batch is stopped
+            if listed.report is not None:
+                files_done = [done[source] for source, _ in pairs if source in done]
+                write_text(listed.report, batch_json(task.options, files_done, len(pairs)))
+    sys.exit(VALID if passed else SOME_FAILED)
+
+
+def _told(results: Iterator[Result], total: int, show: Show) -> Iterator[Result]:
+    """Pass results through and print each, then their summary."""
+    from meshfix_cli.report.facts import Tally
+    from meshfix_cli.report.terminal import console, print_result, print_tally, with_counts
+
+    start, tally, out, plain = time.perf_counter(), Tally(), console(sys.stdout), not (show.quiet or show.as_json)
+    for result in with_counts(results, total, console(sys.stderr)) if plain else results:
+        if result["status"] == "failed":
+            complain(f"{result['file']}: {result['error'].removeprefix(result['file'] + ': ')}")
+        if not show.quiet:
+            print_result(result, out, show.as_json)
+        tally.add(result)
+        yield result
+    if plain:
+        print_tally(tally, time.perf_counter() - start, out)
+
+
+def _passes(result: Result, allow_inverted: bool) -> bool:
+    if allow_inverted and result["status"] == "invalid":
+        return all(one["met"] for one in result["requirements"])
+    return result["status"] in ("valid", "skipped")

@@ -1,0 +1,280 @@
+"""Options that several commands share, and what their values are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import astuple, dataclass, fields
+from functools import partial, wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from meshfix_cli.cli.files import given
+from meshfix_cli.cli.process import cores
+from meshfix_cli.repair import Files, Held, Judge, Method
+from meshfix_cli.solve.perturb import Distance
+from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
+
+if TYPE_CHECKING:
+    from meshfix_cli.quality.requirement import Requirement
+    from meshfix_cli.report.facts import Report
+
+FILE = click.Path(allow_dash=True)  # shells complete it; whether it exists, its reader tells
+
+
+class _Choice(click.Choice):  # type: ignore[type-arg]
+    """A choice whose names come from a module that is imported only when they are needed."""
+
+    def __init__(self, load: Callable[[], tuple[str, ...]]) -> None:
+        self._load = load
+        self.case_sensitive = True
+
+    @property
+    def choices(self) -> tuple[str, ...]:  # type: ignore[override]
+        return self._load()
+
+
+class _Range(click.FloatRange):
+    """NaN is in no range."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)
+        return number if number == number else self.fail(f"{value!r} is not a number", param, ctx)
+
+
+class _Distance(click.ParamType):  # type: ignore[type-arg]
+    name = "LENGTH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            return value if isinstance(value, Distance) else Distance.parse(value)
+        except ValueError:
+            self.fail(f"{value!r} is neither a length such as 0.3 nor in mean edge lengths such as 2h", param, ctx)
+
+
+class _Passes(click.IntRange):
+    """A number of smoothing passes, or "best"."""
+
+    name = "PASSES|best"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == "best":
+            return value
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is neither a number of passes from 0 to {self.max:,} nor 'best'", param, ctx)
+
+
+class _Requirement(click.ParamType):  # type: ignore[type-arg]
+    name = "CONDITION"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        from meshfix_cli.quality.requirement import Requirement
+
+        try:
+            return value if isinstance(value, Requirement) else Requirement.parse(value)
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+LENGTH, PERCENT = _Distance(), _Range(0, 100)
+
+
+def _metrics() -> tuple[str, ...]:
+    from meshfix_cli.quality.metrics import METRICS
+
+    return tuple(METRICS)
+
+
+def _formats() -> tuple[str, ...]:
+    from meshfix_cli.meshfile.formats import writers
+
+    return writers()
+
+
+@dataclass(frozen=True)
+class Show:
+    """How to report."""
+
+    metrics: tuple[str, ...]
+    as_json: bool
+    quiet: bool
+    threads: int = 1
+
+    def judge(self, draw: Draw, requirements: tuple[Requirement, ...] = ()) -> Judge:
+        """Return what is to be found out: little where nothing is shown."""
+        return Judge(self.metrics, requirements, self.threads, brief=self.quiet and not draw.names)
+
+    def print(self, report: Report, stream: Any) -> None:
+        """Print a report as it is asked for."""
+        from meshfix_cli.report.terminal import console, print_json, print_report
+
+        if not self.quiet:
+            (print_json if self.as_json else print_report)(report, console(stream))
+
+
+@dataclass(frozen=True)
+class Draw:
+    """Files that show the report as a page or as pictures."""
+
+    page: str | None
+    plot: str | None
+
+    @property
+    def names(self) -> list[str]:
+        """Those that are asked for."""
+        return given(*astuple(self))
+
+    def check(self) -> None:
+        """Find out before any work whether they can be made."""
+        if self.page is not None and Path(self.page).suffix.lower() == ".json":
+            raise click.UsageError(f"{self.page}: --report writes a page in HTML; --json prints the report as JSON")
+        if self.plot is not None:
+            from meshfix_cli.report.plot import check_plot
+
+            check_plot(self.plot)
+
+    def write(self, report: Report, threads: int) -> None:
+        """Draw and write them."""
+        if not self.names:
+            return
+        from meshfix_cli.meshfile.atomic import write_file, write_text
+        from meshfix_cli.report.figures import figures
+
+        drawn = figures(report, threads)
+        if self.page is not None:
+            from meshfix_cli.report.page import page
+
+            write_text(self.page, page(report, drawn, _options()))
+        if self.plot is not None:
+            from meshfix_cli.report.plot import plot
+
+            write_file(self.plot, partial(plot, report, drawn))
+
+
+def _options() -> dict[str, str]:
+    """Return the options of the command that runs, with the values they have."""
+    context = click.get_current_context()
+    values = {}
+    for option in context.command.params:
+        value = context.params.get(option.name or "")
+        if not isinstance(option, click.Option) or value is None or value is False or value == ():
+            continue
+        text = " ".join(map(str, value)) if isinstance(value, tuple) else "yes" if value is True else str(value)
+        given = context.get_parameter_source(option.name or "") is not ParameterSource.DEFAULT
+        values[option.opts[0]] = text if given else f"{text} (default)"
+    return values
+
+
+def packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[..., Any]:
+    """Add options to a command, which gets their values as one argument `name` of the dataclass `kind`.
+
+    A field without an option has its default.
+    """
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def with_one(**values: Any) -> Any:
+            given = [field.name for field in fields(kind) if field.name in values]
+            values[name] = kind(**{field: values.pop(field) for field in given})
+            return command(**values)
+
+        for option in reversed(options):
+            with_one = option(with_one)
+        return with_one
+
+    return decorate
+
+
+holding = packed(
+    "held",
+    Held,
+    click.option("--fix", metavar="NAME", help="Hold the vertices where this point-data array is not zero."),
+    click.option("--regions", metavar="NAME", help="Hold the interfaces between the regions of this cell-data array."),
+)
+_SHOW = (
+    click.option("--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),
+    click.option("--json", "as_json", is_flag=True, help="Report as JSON, one object and one line for each mesh."),
+    click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
+)
+showing = packed("show", Show, *_SHOW)
+reporting = packed(
+    "show",
+    Show,
+    *_SHOW,
+    click.option(
+        "--threads",
+        type=click.IntRange(1, 1024),
+        default=cores,
+        help="Default: the cores this process may use; 1 with --mpi.",
+    ),
+)
+_STORE = (
+    click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
+    click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
+    click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
+)
+storing = packed("files", Files, *_STORE)
+writing = packed(
+    "files",
+    Files,
+    click.argument("source", metavar="[INPUT]", default="-", type=FILE),
+    click.argument("target", metavar="[OUTPUT]", default="-", type=FILE),
+    click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
+    *_STORE,
+    click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
+)
+solving = packed(
+    "method",
+    Method,
+    click.option(
+        "--strategy",
+        type=click.Choice(tuple(STRATEGIES)),
+        default="auto",
+        show_default=True,
+        help="How inverted elements are mended; `meshfix untangle --help` explains the names.",
+    ),
+    click.option(
+        "--sweeps",
+        type=click.IntRange(0),
+        help="Untangling sweeps at most, all phases together. [default: as each needs]",
+    ),
+    click.option(
+        "--smooth",
+        type=_Passes(0, MOST_PASSES),
+        metavar="PASSES|best",
+        default=SMOOTH,
+        show_default=True,
+        help="Smoothing passes; best: then the mean, then the smallest angle up to its ceiling. "
+        "For a million tetrahedra three passes take 0.4 s, best 2.5 s of one core.",
+    ),
+    click.option(
+        "--threshold",
+        type=_Range(0, 90),
+        metavar="DEGREES",
+        help="Optimise stars with smaller angles. "
+        f"[default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
+    ),
+    click.option("--max-move", type=LENGTH, help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
+    click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
+)
+drawing = packed(
+    "draw",
+    Draw,
+    click.option("--report", "page", metavar="FILE.html", help="Write the report as a page with pictures."),
+    click.option("--plot", metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
+)
+drawing_cells = click.option("--cells", metavar="FILE", help="Write a .vtu or .vtk with the quality of each element.")
+allowing = click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
+requiring = click.option(
+    "--require",
+    "requirements",
+    type=_Requirement(),
+    multiple=True,
+    metavar="CONDITION",
+    help="What else a result must meet, such as 'min_angle >= 5', or exit with 3 (a batch: 4); may be given more "
+    "than once.",
+)

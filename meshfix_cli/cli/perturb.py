@@ -1,0 +1,43 @@
+"""`meshfix perturb`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from meshfix_cli.cli.files import open_files, report_stream
+from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, writing
+from meshfix_cli.repair import Files, Held
+from meshfix_cli.solve.perturb import Distance
+
+if TYPE_CHECKING:
+    pass
+
+
+@click.command()
+@writing
+@click.option("--percent", type=PERCENT, required=True, help="Of all vertices; interior ones move.")
+@click.option("--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@drawing
+@holding
+@reporting
+def perturb(files: Files, held: Held, show: Show, draw: Draw, percent: float, dist: Distance, seed: int) -> None:
+    """Tangle a mesh as the paper does: move some interior vertices by a distance in random directions.
+
+    With one seed, the same vertices move in the same directions whatever --percent and --dist are. Exits with 0
+    whether or not elements are inverted.
+    """
+    from meshfix_cli.solve.perturb import perturb as tangle
+
+    draw.check()
+    document, output = open_files(files, held, show.threads, *draw.names)
+    length = dist.length(document.mesh, show.threads)
+    perturbed, moved = tangle(document.mesh, percent, length, seed)
+    result, notes = files.write(document, perturbed, output)
+    facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}
+    stages = {"before": document.mesh, "perturbed": result}
+    report = show.judge(draw).report("perturb", document, stages, notes, facts=facts)
+    draw.write(report, show.threads)
+    show.print(report, report_stream(files))

@@ -1,0 +1,152 @@
+"""The process: exit codes, signals, and the other processes that mpiexec has started."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from meshfix_cli.errors import MeshfixError
+from meshfix_cli.repair import Method
+
+if TYPE_CHECKING:
+    from mpi4py.MPI import Intracomm
+
+    from meshfix_cli.repair import Steps
+    from meshfix_cli.workers.distributed import Root
+
+VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
+
+# Where launchers say how many processes they have started: Open MPI, MVAPICH, Hydra and whatever else speaks PMI, and
+# srun, which comes last since the others may use it to start one of their own on each machine.
+LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_STEP_NUM_TASKS")
+
+
+# Processes that work for this one, and end with it.
+others: set[str] = set()
+
+
+class Group(click.Group):
+    """Errors are one line on stderr and an exit code, never a traceback; signals leave no temporary file."""
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run a command."""
+        for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # read when numpy and scipy are loaded, later
+            os.environ[name] = "1"  # with more, sums have other bits, and nothing here is large enough to gain
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) != signal.SIG_IGN:  # as nohup does
+                signal.signal(getattr(signal, name), _stop)
+        for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+            if getattr(sys, name) is None:  # closed by the shell: >&-
+                setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 (for the whole run)
+        try:
+            return super().invoke(ctx)
+        except MeshfixError as error:
+            fail(str(error))
+        except MemoryError:
+            fail("out of memory")
+        except BrokenPipeError:  # whoever read our output has gone, and Python would flush to it once more
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            sys.exit(128 + getattr(signal, "SIGPIPE", 13))
+        except OSError as error:
+            fail(str(error))
+
+
+def _stop(number: int, frame: object) -> NoReturn:
+    """End, where there is something to clear up through every `finally`; a second signal must not disturb that.
+
+    Elsewhere at once: in the middle of an import Python may drop an exception.
+    """
+    del frame
+    signal.signal(number, signal.SIG_IGN)
+    atomic = sys.modules.get("meshfix_cli.meshfile.atomic")
+    if others or getattr(atomic, "under_way", None):
+        sys.exit(128 + number)
+    os._exit(128 + number)
+
+
+def complain(message: str) -> None:
+    """Print an error, on one line of stderr."""
+    click.echo(f"meshfix: error: {' '.join(message.split())}", err=True)
+
+
+def fail(message: str) -> NoReturn:
+    """Print an error and end."""
+    complain(message)
+    sys.exit(ERROR)
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) -> Iterator[Root]:
+    """Give the root those that mpiexec has started; they work for it, and end as it does."""
+    from meshfix_cli.workers.distributed import ROOT, Root, serve
+
+    comm = find_processes()
+    others.add("mpi")
+    if comm.rank != ROOT:
+        try:
+            code = serve(comm, method, threads)
+        except BaseException as error:
+            abort_all(comm, error)
+        sys.exit(code)
+    root, code = Root(comm, method, threads, watch), ERROR
+    try:
+        yield root
+    except BaseException as error:
+        if root.busy:
+            abort_all(comm, error)
+        if isinstance(error, SystemExit) and isinstance(error.code, int):
+            code = error.code
+        elif isinstance(error, click.ClickException):
+            code = error.exit_code
+        raise
+    finally:
+        root.dismiss(code)
+
+
+def find_processes() -> Intracomm:
+    """Find the processes; until all are there, signals end this one where it is."""
+    from meshfix_cli.workers.mpi import world
+
+    handlers = {number: signal.signal(number, signal.SIG_DFL) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        return world(_launched())
+    finally:
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+
+
+def abort_all(comm: Intracomm, error: BaseException) -> NoReturn:
+    """End all processes with the error of one: the others would wait for it for ever."""
+    from meshfix_cli.workers.mpi import abort
+
+    code = error.code if isinstance(error, SystemExit) and isinstance(error.code, int) else ERROR
+    try:
+        if isinstance(error, (MeshfixError, MemoryError, OSError)):
+            complain(f"process {comm.rank}: {str(error) or type(error).__name__}")
+        elif not isinstance(error, SystemExit):  # of a signal
+            traceback.print_exception(error)
+        sys.stdout.flush()
+        sys.stderr.flush()
+    finally:
+        abort(comm, code)
+
+
+def _launched() -> int | None:
+    """How many processes the launcher of MPI programs says it has started, if there is one."""
+    sizes = [os.environ[name] for name in LAUNCHED if name in os.environ]
+    return int(sizes[0]) if sizes and sizes[0].isdecimal() else None

@@ -1,0 +1,64 @@
+"""`meshfix quality`."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING
+
+import click
+
+from meshfix_cli.cli.files import check_input, check_others, given, write_cells
+from meshfix_cli.cli.options import FILE, Draw, Show, drawing, drawing_cells, holding, reporting, requiring
+from meshfix_cli.cli.process import ERROR, INVERTED, SOME_FAILED, VALID, complain
+from meshfix_cli.errors import MeshfixError
+from meshfix_cli.repair import Held
+
+if TYPE_CHECKING:
+    from meshfix_cli.quality.requirement import Requirement
+
+
+@click.command()
+@click.argument("sources", metavar="INPUT...", nargs=-1, required=True, type=FILE)
+@drawing_cells
+@drawing
+@click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
+@requiring
+@holding
+@reporting
+def quality(
+    sources: tuple[str, ...],
+    cells: str | None,
+    draw: Draw,
+    everything: bool,
+    requirements: tuple[Requirement, ...],
+    held: Held,
+    show: Show,
+) -> None:
+    """Report the quality of meshes, and where elements are inverted. One unreadable mesh does not stop the others.
+
+    A CONDITION compares a number of the JSON report (inverted, folded, min_measure, min_angle, max_angle,
+    mean_min_angle, percentile_1), or the worst value of a --metric, by >=, <=, >, < or ==.
+    """
+    beside = given(cells, *draw.names)
+    if beside and len(sources) > 1:
+        raise click.UsageError("--cells, --report and --plot take one INPUT")
+    draw.check()
+    codes = set()
+    for source in sources:
+        try:
+            check_input(source)
+            check_others(beside, source)
+            document = held.read(source, show.threads)
+            check_others(beside, *document.files)
+            if cells is not None:
+                write_cells(document, document.mesh, cells, show.threads)
+            stages = {"mesh": document.mesh}
+            report = show.judge(draw, requirements).report("quality", document, stages, everything=everything)
+            draw.write(report, show.threads)
+        except MeshfixError as error:
+            complain(str(error))
+            codes.add(ERROR)
+            continue
+        show.print(report, sys.stdout)
+        codes.add(VALID if report.valid and report.met else INVERTED)
+    sys.exit(max(codes) if ERROR not in codes else SOME_FAILED if len(sources) > 1 else ERROR)

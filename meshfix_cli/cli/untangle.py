@@ -1,0 +1,95 @@
+"""`meshfix untangle`."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import nullcontext
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import click
+from click.core import ParameterSource
+
+from meshfix_cli.cli.files import open_files, report_stream, write_cells
+from meshfix_cli.cli.options import (
+    Draw,
+    Show,
+    allowing,
+    drawing,
+    drawing_cells,
+    holding,
+    reporting,
+    requiring,
+    solving,
+    writing,
+)
+from meshfix_cli.cli.process import INVERTED, VALID, processes
+from meshfix_cli.repair import Files, Held, Method, repair
+
+if TYPE_CHECKING:
+    from meshfix_cli.quality.requirement import Requirement
+
+
+@click.command()
+@writing
+@solving
+@click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
+@drawing_cells
+@drawing
+@allowing
+@click.option("--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes.")
+@click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
+@requiring
+@holding
+@reporting
+def untangle(
+    files: Files,
+    held: Held,
+    show: Show,
+    method: Method,
+    history: str | None,
+    cells: str | None,
+    draw: Draw,
+    allow_inverted: bool,
+    verbose: bool,
+    mpi: bool,
+    requirements: tuple[Requirement, ...],
+) -> None:
+    """Move interior vertices until no element is inverted, then improve the worst angles.
+
+    Strategies: auto (Laplacian sweeps, the linear programme on stars that are still invalid, then FF where that is not
+    enough), FF (the foldover-free energy, minimised over all vertices at once), and the paper's LS (Laplacian), US
+    (linear programme), CS (both for each vertex), LUS (3 Laplacian sweeps, then the programme).
+    For CONDITION see `meshfix quality --help`.
+    """
+    from meshfix_cli.meshfile.atomic import write_text
+    from meshfix_cli.meshfile.writing import check_cells
+    from meshfix_cli.report.as_json import history_csv
+    from meshfix_cli.report.terminal import console, with_progress
+
+    if verbose and show.quiet:
+        raise click.UsageError("--quiet and --verbose exclude each other")
+    if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
+        show = replace(show, threads=1)  # the launcher has a process for each core
+        click.get_current_context().params["threads"] = 1
+    silent = show.quiet or (show.as_json and not verbose)
+    watch = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
+    with processes(method, show.threads, watch) if mpi else nullcontext() as root:
+        if root and files.source == "-":
+            raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
+        draw.check()
+        document, output = open_files(files, held, show.threads, history, cells, *draw.names)
+        if cells is not None:
+            check_cells(document, cells)
+        solve, put = (
+            (root.solve, root.put) if root else (partial(method.solve, threads=show.threads, watch=watch), None)
+        )
+        report = repair(document, output, files, method, show.judge(draw, requirements), solve, put)
+        if history is not None:
+            write_text(history, history_csv(report.records))
+        if cells is not None:
+            write_cells(document, report.mesh, cells, show.threads)
+        draw.write(report, show.threads)
+        show.print(report, report_stream(files))
+        sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)

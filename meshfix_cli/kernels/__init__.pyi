@@ -1,0 +1,187 @@
+"""The compiled kernels; arrays are C-contiguous and of exactly these types (nothing is converted)."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+Int32 = NDArray[np.int32]
+Int64 = NDArray[np.int64]
+Float64 = NDArray[np.float64]
+
+BUILD: str  # what processors these are for
+DUE: int
+BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
+
+class Connectivity:
+    """A mesh in the order of the kernels; the arrays are described in mesh/order.hpp, facets.hpp and stars.hpp.
+
+    All of them are views; faces and what follows it are empty until the stars are built.
+    """
+
+    def __init__(self, points: Float64, simplices: Int32, used: Int32, threads: int) -> None: ...
+    @staticmethod
+    def part(simplices: Int32, n: int, threads: int) -> Connectivity:
+        """A part of a mesh that has an order already: n vertices and simplices (m, d+1) that stay as they are.
+
+        Of what the facets tell, it has nothing.
+        """
+
+    def flip(self, flipped: NDArray[np.bool_], threads: int) -> None:
+        """Give some simplices (m,) the other orientation."""
+
+    def build_stars(self, threads: int) -> None:
+        """Do it, where it is not done; ValueError where a star or the mesh is too large to be numbered."""
+
+    def grown(self, mask: NDArray[np.bool_], rings: int) -> NDArray[np.uint8]:
+        """Mark these vertices (n,) and rings of neighbours."""
+
+    def stuck(self, movable: NDArray[np.bool_], threads: int) -> Int32:
+        """Simplices without a movable vertex."""
+
+    def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32]:
+        """Facets (f, d) without a movable vertex, each once, and a simplex of each."""
+
+    @property
+    def crowded(self) -> int:
+        """A corner whose facet is shared by too many simplices, then there is no more; or -1."""
+
+    @property
+    def orientable(self) -> bool: ...
+    @property
+    def vertices(self) -> Int32: ...
+    @property
+    def rows(self) -> Int32: ...
+    @property
+    def simplices(self) -> Int32: ...
+    @property
+    def mates(self) -> Int32: ...
+    @property
+    def component(self) -> Int32: ...
+    @property
+    def against(self) -> NDArray[np.uint8]: ...
+    @property
+    def offsets(self) -> Int32: ...
+    @property
+    def corners(self) -> Int32: ...
+    @property
+    def faces(self) -> NDArray[np.uint16]: ...
+    @property
+    def neighbour_offsets(self) -> Int32: ...
+    @property
+    def neighbours(self) -> Int32: ...
+    @property
+    def colour_offsets(self) -> Int32: ...
+    @property
+    def colour_blocks(self) -> Int32: ...
+
+def check_simplices(simplices: Int32, n: int, threads: int) -> tuple[int, int]:
+    """The first row with a number outside 0 .. n-1, and the first that names a vertex twice; -1: none."""
+
+def used_vertices(simplices: Int32, n: int) -> Int32:
+    """Return the vertices of simplices, ascending."""
+
+def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
+    """Rows of the inverted simplices, and the smallest signed measure."""
+
+def moved(before: Float64, after: Float64, threads: int) -> NDArray[np.uint8]:
+    """1 for the rows (n,) that differ."""
+
+def summarise(
+    points: Float64, mesh: Connectivity, bins: int, width: float, threads: int
+) -> tuple[Float64, Int64, float, Int32, int, float, float]:
+    """Smallest angles (m,), their histogram and sum, inverted simplices, folded facets, smallest measure.
+
+    Last comes the largest angle. Angles are in radians, as is the width of the bins.
+    """
+
+def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
+    """Return the smallest sine^2 of the valid simplices; 1: there are none."""
+
+def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
+    """Signed measure and validity, each (m,)."""
+
+def angles(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, Float64]:
+    """Smallest and largest (dihedral) angle in radians, each (m,)."""
+
+def relocate(
+    move: int,
+    points: Float64,
+    states: NDArray[np.uint8],
+    mesh: Connectivity,
+    blocks: Int32,
+    threshold_sine2: float,
+    min_measure: float,
+    start: Float64,
+    max_move: float,
+    threads: int,
+) -> tuple[int, int]:
+    """Relocate, in place, the vertices that are due, of some blocks of one colour; the numbers visited and moved.
+
+    States (n,): 0 for a vertex that is held, DUE, or 1 when it has been visited and neither it nor a neighbour moved.
+
+    The threshold is that of the active-set method, or the floor of MEAN_RATIO and MEAN_ANGLE. Smoothing makes no
+    measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
+    """
+
+def receive(
+    points: Float64, states: NDArray[np.uint8], mesh: Connectivity, vertices: Int32, positions: Float64
+) -> None:
+    """Put vertices (k,) that another process moved at their positions (k, d); what has such a neighbour is due."""
+
+def linear_program(
+    neighbours: Float64, faces: NDArray[np.uint16], heights: bool
+) -> tuple[int, Float64, Float64, Float64, int]:
+    """Status (0 optimal, 1 degenerate, 2 failed), (x, t), dual weights of faces and box sides, axes of the box, pivots.
+
+    heights: t is the smallest height over a face instead of the smallest determinant.
+    """
+
+def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
+    """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
+
+class Foldover:
+    """The foldover-free energy of simplices and its gradient; see moves/foldover.hpp."""
+
+    def __init__(self, simplices: Int32, n: int) -> None: ...
+    def evaluate(
+        self, points: Float64, sizes: Float64, eps: float, weight: float, free: int, threads: int
+    ) -> tuple[float, Float64, float]:
+        """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
+
+def min_norm_point(vectors: Float64) -> Float64:
+    """Return the point of smallest norm in the convex hull of the rows."""
+
+def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[Float64, Float64, float]:
+    """Sines of a star, their gradients, and sign * (smallest sine)^2 (-1 where the star is not valid)."""
+
+def mean_angle(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, list[float]]:
+    """Sum of sin - cos of the smallest angles of a star's simplices, and its gradient (d,)."""
+
+def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, float, Float64, Float64]:
+    """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""
+
+def find_words(data: bytes, at: int, count: int) -> Int64:
+    """Spans (count, 2) of the first words at or behind an offset; fewer where the data end."""
+
+def line_words(data: bytes, offsets: Int64, count: int) -> Int64:
+    """Spans (k * count, 2) of the first words behind each offset (k,), -1 for those that the line does not have."""
+
+def use_threads(threads: int) -> None:
+    """Let the passes over text, from here to the end of this file, take as many threads: 1 at first."""
+
+def behind_words(data: bytes, at: int, count: int) -> int:
+    """Return the offset behind the next words; -1: there are fewer."""
+
+def scan_integers(data: bytes, at: int, count: int) -> tuple[Int32 | Int64, int, int]:
+    """Values, in 32 bits where these do, the offset behind them, and the offset of what is not an integer or -1."""
+
+def integers(data: bytes, spans: Int64, slash: bool) -> tuple[Int64, int]:
+    """Values of the words at spans (n, 2), up to a slash if it may be there, and the row of the first bad one or -1."""
+
+def numbers(data: bytes, spans: Int64, single: bool) -> tuple[Float64, int]:
+    """Values of the words at spans (n, 2), and the row of the first that is not a number or -1; single: of float32."""
+
+def shortest(values: Float64, single: bool, longest: int) -> tuple[bytes, Int64]:
+    """The shortest texts that read back to the values, joined, and their spans; longest: characters at most, or 0."""
+
+def replace(data: bytes, spans: Int64, words: bytes, word_spans: Int64) -> bytes:
+    """The data with each span (k, 2), in their order, replaced by a span of `words`."""

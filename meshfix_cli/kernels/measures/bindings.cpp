@@ -1,0 +1,98 @@
+// Bindings of the passes that measure a mesh, and of the sines of a star.
+#include "measures/measures.hpp"
+#include "measures/python.hpp"
+#include "mesh/python.hpp"
+
+namespace meshfix {
+
+namespace {
+
+auto summarise_py(const Matrix<const double>& points, const PyConnectivity& self, int bins, double width, int threads) {
+    check_points(points, self);
+    Summary total = with_dimension(self.dimension, [&](auto d) {
+        return summarise<d>(points.data(), self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), bins, width,
+                            threads);
+    });
+    return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.histogram)), total.sum,
+                           to_numpy(std::move(total.inverted)), total.folded, total.min_measure, total.largest);
+}
+
+auto check_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    Validity total = with_dimension(points.shape(1), [&](auto d) {
+        return check<d>(points.data(), simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), threads);
+    });
+    return std::make_pair(to_numpy(std::move(total.inverted)), total.min_measure);
+}
+
+double min_sine2_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    return with_dimension(points.shape(1), [&](auto d) {
+        return min_sine2<d>(points.data(), simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), threads);
+    });
+}
+
+auto measure_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    const auto m = static_cast<std::int64_t>(simplices.shape(0));
+    std::vector<double> measure(m);
+    std::vector<std::uint8_t> valid(m);
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t s = begin; s < end; ++s) {
+                const Edges<D> e = edges_of<D>(points.data(), simplices.data() + s * (D + 1));
+                const double det = determinant(e);
+                measure[s] = det / factorial(D);
+                valid[s] = is_valid<D>(e, det);
+            }
+        });
+    });
+    return std::make_pair(to_numpy(std::move(measure)), to_numpy(std::move(valid)));
+}
+
+auto angles_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
+    const std::size_t m = simplices.shape(0);
+    std::vector<double> smallest(m), largest(m);
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(static_cast<std::int64_t>(m), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for_each_angles<D>(points.data(), simplices.data(), begin, end,
+                               [&](std::int64_t s, const Edges<D>&, AngleRange range) {
+                                   smallest[s] = range.smallest;
+                                   largest[s] = range.largest;
+                               });
+        });
+    });
+    return std::make_pair(to_numpy(std::move(smallest)), to_numpy(std::move(largest)));
+}
+
+auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+              const Vector<const double>& x) {
+    const std::size_t d = neighbours.shape(1);
+    auto [values, gradients, smallest] = with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        const Star<D> star = make_star<D>(neighbours, faces, x.data());
+        std::vector<double> values, gradients;
+        for (int i = 0; i < star.faces_count; ++i) {
+            std::array<Sine<D>, functions_per_simplex(D)> functions;
+            sines(star.edges(i, star.position), functions.data());
+            for (const auto& f : functions) {
+                values.push_back(f.value);
+                gradients.insert(gradients.end(), f.gradient.begin(), f.gradient.end());
+            }
+        }
+        return std::make_tuple(values, gradients, min_sine2<D>(star, star.position, 0.0));
+    });
+    return std::make_tuple(to_numpy(std::move(values)), to_numpy(std::move(gradients), d), smallest);
+}
+
+}  // namespace
+
+void bind_measures(nb::module_& m) {
+    m.def("summarise", &summarise_py, "points"_a.noconvert(), "mesh"_a, "bins"_a, "width"_a, "threads"_a);
+    m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+}
+
+}  // namespace meshfix

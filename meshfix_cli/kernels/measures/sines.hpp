@@ -1,0 +1,121 @@
+// The quality of a simplex: the sines of its angles (2-D) or dihedral angles (3-D), equation (3.2).
+//
+// A simplex is a face of a star (its vertices a, b and c in positive order) and the free vertex x; A, B, C are the
+// edges from x to them. In 2-D sin = det / (product of the two edges at the angle); in 3-D
+// sin = det * (edge) / (product of the normals of the two triangles at the edge).
+#pragma once
+
+#include "mesh/star.hpp"
+
+namespace meshfix {
+
+constexpr int functions_per_simplex(int d) { return d == 2 ? 3 : 6; }
+
+// sign(det) * (smallest sine)^2 without square roots; -1 or NaN where the simplex is not valid.
+template <class T>
+inline T min_sine2(const Edges<2, T>& e) {
+    const T det = determinant(e), a = norm2(e[0]), b = norm2(e[1]), ab = norm2(e[1] - e[0]);
+    const T sine2 = det * det / larger(larger(a * b, a * ab), b * ab);
+    return select(is_valid<2>(det, larger(larger(a, b), ab)), sine2, constant<T>(-1.0));
+}
+
+template <class T>
+inline T min_sine2(const Edges<3, T>& e) {
+    const Vec<3, T>&A = e[0], &B = e[1], &C = e[2];
+    const Vec<3, T> AB = B - A, BC = C - B, CA = A - C;
+    const Vec<3, T> normal_a = cross(B, C), normal_b = cross(C, A), normal_c = cross(A, B);
+    const T det = dot(A, normal_a);
+    const T a = norm2(A), b = norm2(B), c = norm2(C), ab = norm2(AB), bc = norm2(BC), ca = norm2(CA);
+    const T nx = norm2(cross(AB, BC)), na = norm2(normal_a), nb = norm2(normal_b), nc = norm2(normal_c);
+    // Each edge^2 over the normals^2 beside it, on the common denominator nx na nb nc: one division for six sines.
+    const T at_x = nx * smaller(smaller(a * na, b * nb), c * nc);
+    const T opposite = smaller(smaller(ab * na * nb, bc * nb * nc), ca * nc * na);
+    const T sine2 = det * det * smaller(at_x, opposite) / (nx * na * nb * nc);
+    const T longest = larger(larger(larger(a, b), larger(c, ab)), larger(bc, ca));
+    return select(is_valid<3>(det, longest), sine2, constant<T>(-1.0));
+}
+
+// The smallest over the star at x; as soon as it is not above `floor` the rest is not looked at and -1 returned.
+template <int D>
+double min_sine2(const Star<D>& star, const Vec<D>& x, double floor) {
+    double smallest = INFINITY;
+    for (const auto& block : star.blocks) {
+        const Pack lanes = min_sine2(star.edges(block, x));
+        for (int i = 0; i < LANES; ++i) {
+            if (!(lanes[i] > floor)) return -1.0;
+            smallest = std::min(smallest, lanes[i]);
+        }
+    }
+    return smallest;
+}
+
+// A sine and its gradient with respect to x.
+template <int D, class T = double>
+struct Sine {
+    T value;
+    Vec<D, T> gradient;
+};
+
+// d(sine) = sine * d(log sine); each factor below comes with half the gradient of the log of its square.
+template <int D, class T>
+struct Factor {
+    T length;
+    Vec<D, T> log_gradient;
+};
+
+// The edge from x to p, E = p - x:  d log|E| = -E / |E|^2.
+template <int D, class T>
+inline Factor<D, T> edge_factor(const Vec<D, T>& E) {
+    const T length2 = norm2(E);
+    return {square_root(length2), (constant<T>(-1.0) / length2) * E};
+}
+
+// The triangle x, p, q with normal N = P x Q:  d log|N| = (P - Q) x N / |N|^2.
+template <class T>
+inline Factor<3, T> triangle_factor(const Vec<3, T>& P, const Vec<3, T>& Q) {
+    const Vec<3, T> normal = cross(P, Q);
+    const T length2 = norm2(normal);
+    return {square_root(length2), (constant<T>(1.0) / length2) * cross(P - Q, normal)};
+}
+
+template <class T>
+inline void sines(const Edges<2, T>& e, Sine<2, T>* out) {
+    const T det = determinant(e), ab = square_root(norm2(e[1] - e[0]));
+    const Vec<2, T> log_det = (constant<T>(1.0) / det) * Vec<2, T>{e[0][1] - e[1][1], e[1][0] - e[0][0]};
+    const auto a = edge_factor<2>(e[0]), b = edge_factor<2>(e[1]);
+    const auto emit = [&](T value, const Vec<2, T>& log_gradient) { *out++ = {value, value * log_gradient}; };
+    emit(det / (a.length * b.length), log_det - a.log_gradient - b.log_gradient);
+    emit(det / (a.length * ab), log_det - a.log_gradient);
+    emit(det / (b.length * ab), log_det - b.log_gradient);
+}
+
+template <class T>
+inline void sines(const Edges<3, T>& e, Sine<3, T>* out) {
+    const Vec<3, T>&A = e[0], &B = e[1], &C = e[2];
+    const Vec<3, T> base = cross(B - A, C - A);
+    const T det = determinant(e), nx = square_root(norm2(base));
+    const Vec<3, T> log_det = (constant<T>(-1.0) / det) * base;
+    const auto a = edge_factor<3>(A), b = edge_factor<3>(B), c = edge_factor<3>(C);
+    const auto na = triangle_factor(B, C), nb = triangle_factor(C, A), nc = triangle_factor(A, B);
+    // The edge from x between two of the moving triangles, and the edge of the face below the third.
+    const auto pair = [&](const Factor<3, T>& edge, T fixed_edge, const Factor<3, T>& p, const Factor<3, T>& q,
+                          const Factor<3, T>& below) {
+        const T sine = det * edge.length / (p.length * q.length);
+        *out++ = {sine, sine * (log_det + edge.log_gradient - p.log_gradient - q.log_gradient)};
+        const T fixed_sine = det * fixed_edge / (below.length * nx);
+        *out++ = {fixed_sine, fixed_sine * (log_det - below.log_gradient)};
+    };
+    pair(a, square_root(norm2(C - B)), nb, nc, na);
+    pair(b, square_root(norm2(A - C)), nc, na, nb);
+    pair(c, square_root(norm2(B - A)), na, nb, nc);
+}
+
+// All sines of the star at x: functions_per_simplex(D) for each block of faces.
+template <int D>
+void sines(const Star<D>& star, const Vec<D>& x, std::vector<Sine<D, Pack>>& out) {
+    out.resize(star.blocks.size() * functions_per_simplex(D));
+    for (std::size_t b = 0; b < star.blocks.size(); ++b)
+        sines(star.edges(star.blocks[b], x), &out[b * functions_per_simplex(D)]);
+}
+
+}  // namespace meshfix

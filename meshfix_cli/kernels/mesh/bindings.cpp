@@ -1,0 +1,209 @@
+// Bindings of what a mesh is: its order, facets, stars and crossings.
+#include <memory>
+
+#include "mesh/crossings.hpp"
+#include "mesh/python.hpp"
+
+namespace meshfix {
+
+namespace {
+
+template <auto Member>
+auto view(PyConnectivity& self) {
+    auto& values = self.mesh.*Member;
+    using T = typename std::remove_reference_t<decltype(values)>::value_type;
+    return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+}
+
+template <auto Member>
+auto rows_view(PyConnectivity& self) {
+    auto& values = self.mesh.*Member;
+    using T = typename std::remove_reference_t<decltype(values)>::value_type;
+    const std::size_t columns = static_cast<std::size_t>(self.dimension) + 1;
+    return Matrix<const T>(values.data(), {values.size() / columns, columns}, nb::find(self));
+}
+
+const std::uint8_t* bytes_of(const Vector<const bool>& mask, std::int64_t expected) {
+    if (static_cast<std::int64_t>(mask.shape(0)) != expected) throw nb::value_error("the mask is of another mesh");
+    return reinterpret_cast<const std::uint8_t*>(mask.data());
+}
+
+void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
+                       const Matrix<const std::int32_t>& simplices, const Vector<const std::int32_t>& used, int threads) {
+    if (simplices.shape(1) != points.shape(1) + 1) throw nb::value_error("the simplices are of another dimension");
+    new (self) PyConnectivity();
+    self->dimension = static_cast<int>(points.shape(1));
+    self->mesh = with_dimension(points.shape(1), [&](auto d) {
+        return connect<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
+                          static_cast<std::int64_t>(simplices.shape(0)),
+                          std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
+    });
+}
+
+PyConnectivity* part_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
+    auto self = std::make_unique<PyConnectivity>();
+    self->dimension = static_cast<int>(simplices.shape(1)) - 1;
+    self->mesh = with_dimension(simplices.shape(1) - 1, [&](auto d) {
+        return part_of_mesh<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n, threads);
+    });
+    return self.release();
+}
+
+void flip_py(PyConnectivity& self, const Vector<const bool>& flipped, int threads) {
+    const std::uint8_t* mask = bytes_of(flipped, self.mesh.m());
+    with_dimension(self.dimension, [&](auto d) { flip<d>(self.mesh, mask, threads); });
+}
+
+void build_stars_py(PyConnectivity& self, int threads) {
+    with_dimension(self.dimension, [&](auto d) {  // the interpreter lock is released first: nobody waits for both
+        const std::lock_guard<std::mutex> lock(self.building);
+        if (self.has_stars) return;
+        build_stars<d>(self.mesh, threads);
+        self.has_stars = true;
+    });
+}
+
+// All but the stars, which are built again.
+nb::tuple state_of(PyConnectivity& self) {
+    return nb::make_tuple(self.dimension, self.mesh.orientable, rows_view<&Connectivity::simplices>(self),
+                          rows_view<&Connectivity::mates>(self), view<&Connectivity::vertices>(self),
+                          view<&Connectivity::rows>(self), view<&Connectivity::offsets>(self),
+                          view<&Connectivity::corners>(self), view<&Connectivity::component>(self),
+                          view<&Connectivity::against>(self));
+}
+
+template <class Array>
+auto copied(const Array& array) {
+    return std::vector<std::remove_const_t<typename Array::Scalar>>(array.data(), array.data() + array.size());
+}
+
+using Int32s = Vector<const std::int32_t>;
+using Int32Rows = Matrix<const std::int32_t>;
+using State = std::tuple<int, bool, Int32Rows, Int32Rows, Int32s, Int32s, Int32s, Int32s, Int32s, Vector<const std::uint8_t>>;
+
+void restore(PyConnectivity& self, const State& state) {
+    new (&self) PyConnectivity();
+    Connectivity& mesh = self.mesh;
+    self.dimension = std::get<0>(state);
+    mesh.orientable = std::get<1>(state);
+    mesh.simplices = copied(std::get<2>(state));
+    mesh.mates = copied(std::get<3>(state));
+    mesh.vertices = copied(std::get<4>(state));
+    mesh.rows = copied(std::get<5>(state));
+    mesh.offsets = copied(std::get<6>(state));
+    mesh.corners = copied(std::get<7>(state));
+    mesh.component = copied(std::get<8>(state));
+    mesh.against = copied(std::get<9>(state));
+}
+
+auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int rings) {
+    const std::uint8_t* bytes = bytes_of(mask, self.mesh.n());
+    std::vector<std::uint8_t> marked(bytes, bytes + self.mesh.n());
+    with_dimension(self.dimension, [&](auto d) {
+        for (int ring = 0; ring < rings; ++ring) grow<d>(self.mesh, marked);
+    });
+    return to_numpy(std::move(marked));
+}
+
+auto stuck_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
+    const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
+    return to_numpy(with_dimension(self.dimension, [&](auto d) {
+        return stuck_simplices<d>(self.mesh.simplices.data(), self.mesh.m(), mask, threads);
+    }));
+}
+
+auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
+    const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
+    FixedFacets found = with_dimension(self.dimension, [&](auto d) {
+        return fixed_facets<d>(self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), mask, threads);
+    });
+    return std::make_pair(to_numpy(std::move(found.vertices), static_cast<std::size_t>(self.dimension)),
+                          to_numpy(std::move(found.owners)));
+}
+
+auto used_vertices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
+    return to_numpy(used_vertices(simplices.data(), static_cast<std::int64_t>(simplices.size()), n));
+}
+
+auto check_simplices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
+    const auto m = static_cast<std::int64_t>(simplices.shape(0));
+    const auto columns = static_cast<std::int64_t>(simplices.shape(1));
+    struct Bad {
+        std::int64_t outside = -1, repeated = -1;
+    };
+    std::vector<Bad> parts(m / PER_ITEM + 1);
+    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t s = end; s-- > begin;) {
+            const std::int32_t* row = simplices.data() + s * columns;
+            for (std::int64_t i = 0; i < columns; ++i) {
+                if (row[i] < 0 || row[i] >= n) parts[item].outside = s;
+                for (std::int64_t j = 0; j < i; ++j)
+                    if (row[i] == row[j]) parts[item].repeated = s;
+            }
+        }
+    });
+    Bad first;
+    for (const auto& part : parts) {
+        if (first.outside < 0) first.outside = part.outside;
+        if (first.repeated < 0) first.repeated = part.repeated;
+    }
+    return std::make_pair(first.outside, first.repeated);
+}
+
+auto crossings_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets, int threads) {
+    const auto count = static_cast<std::int64_t>(facets.shape(0));
+    std::vector<std::int32_t> pairs = with_dimension(
+        points.shape(1), [&](auto d) { return Crossings<d>(points.data(), facets.data(), count, threads).find(threads); });
+    return to_numpy(std::move(pairs), 2);
+}
+
+// Where two arrays of points differ.
+auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after, int threads) {
+    if (before.size() != after.size()) throw nb::value_error("the points are of two meshes");
+    const std::size_t n = before.shape(0), d = before.shape(1);
+    std::vector<std::uint8_t> moved(n, 0);
+    for_each_range(static_cast<std::int64_t>(n), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i)
+            for (std::size_t k = i * d; k < (i + 1) * d; ++k) moved[i] |= before.data()[k] != after.data()[k];
+    });
+    return to_numpy(std::move(moved));
+}
+
+}  // namespace
+
+void bind_mesh(nb::module_& m) {
+    m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
+    m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
+    m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert(), "threads"_a);
+    m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
+    m.attr("BLOCK_SIZE") = BLOCK_SIZE;
+
+    nb::class_<PyConnectivity>(m, "Connectivity")
+        .def("__init__", &init_connectivity, "points"_a.noconvert(), "simplices"_a.noconvert(), "used"_a.noconvert(),
+             "threads"_a)
+        .def("__getstate__", &state_of)
+        .def("__setstate__", &restore)
+        .def_static("part", &part_py, "simplices"_a.noconvert(), "n"_a, "threads"_a)
+        .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
+        .def("build_stars", &build_stars_py, "threads"_a)
+        .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
+        .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)
+        .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a)
+        .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })
+        .def_prop_ro("orientable", [](PyConnectivity& self) { return self.mesh.orientable; })
+        .def_prop_ro("simplices", &rows_view<&Connectivity::simplices>)
+        .def_prop_ro("mates", &rows_view<&Connectivity::mates>)
+        .def_prop_ro("vertices", &view<&Connectivity::vertices>)
+        .def_prop_ro("rows", &view<&Connectivity::rows>)
+        .def_prop_ro("component", &view<&Connectivity::component>)
+        .def_prop_ro("against", &view<&Connectivity::against>)
+        .def_prop_ro("offsets", &view<&Connectivity::offsets>)
+        .def_prop_ro("corners", &view<&Connectivity::corners>)
+        .def_prop_ro("faces", &view<&Connectivity::faces>)
+        .def_prop_ro("neighbour_offsets", &view<&Connectivity::neighbour_offsets>)
+        .def_prop_ro("neighbours", &view<&Connectivity::neighbours>)
+        .def_prop_ro("colour_offsets", &view<&Connectivity::colour_offsets>)
+        .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
+}
+
+}  // namespace meshfix

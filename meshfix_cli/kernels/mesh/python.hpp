@@ -1,0 +1,30 @@
+// The mesh as Python holds it.
+#pragma once
+
+#include <atomic>
+#include <mutex>
+
+#include "arrays.hpp"
+#include "mesh/star.hpp"
+#include "mesh/stars.hpp"
+
+namespace meshfix {
+
+struct PyConnectivity {
+    int dimension = 0;
+    Connectivity mesh{};
+    std::mutex building{};  // of the stars, which come later
+    std::atomic<bool> has_stars{false};
+};
+
+template <class T>
+void check_points(const Matrix<T>& points, const PyConnectivity& self) {
+    if (static_cast<int>(points.shape(1)) != self.dimension || static_cast<std::int64_t>(points.shape(0)) != self.mesh.n())
+        throw nb::value_error("the points are of another mesh");
+}
+
+inline StarsView stars_of(const Connectivity& mesh) {
+    return {mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(), mesh.neighbours.data()};
+}
+
+}  // namespace meshfix

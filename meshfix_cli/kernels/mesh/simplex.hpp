@@ -1,0 +1,86 @@
+// One simplex: its determinant, its longest edge and whether it is valid.
+//
+// A simplex is given by the edges that leave one of its vertices, e[0..D-1], in positive order.
+#pragma once
+
+#include "common/tolerances.hpp"
+#include "common/vec.hpp"
+
+namespace meshfix {
+
+template <int D, class T = double>
+using Edges = std::array<Vec<D, T>, D>;
+
+// d! times the signed measure, equations (2.2) and (2.3).
+template <class T>
+inline T determinant(const Edges<2, T>& e) {
+    return cross(e[0], e[1]);
+}
+template <class T>
+inline T determinant(const Edges<3, T>& e) {
+    return dot(e[0], cross(e[1], e[2]));
+}
+
+constexpr double factorial(int d) { return d == 2 ? 2.0 : 6.0; }
+
+// Squared length of the longest edge.
+template <int D, class T>
+inline T longest_edge2(const Edges<D, T>& e) {
+    T longest = norm2(e[0]);
+    for (int i = 0; i < D; ++i) {
+        longest = larger(longest, norm2(e[i]));
+        for (int j = i + 1; j < D; ++j) longest = larger(longest, norm2(e[j] - e[i]));
+    }
+    return longest;
+}
+
+template <int D, class T>
+inline T sum_of_squared_edges(const Edges<D, T>& e) {
+    T sum = constant<T>(0.0);
+    for (int i = 0; i < D; ++i) {
+        sum += norm2(e[i]);
+        for (int j = i + 1; j < D; ++j) sum += norm2(e[j] - e[i]);
+    }
+    return sum;
+}
+
+// The gradient of the determinant by the vertex that the edges leave.
+template <class T>
+inline Vec<2, T> determinant_slope(const Edges<2, T>& e) {
+    return {e[0][1] - e[1][1], e[1][0] - e[0][0]};
+}
+template <class T>
+inline Vec<3, T> determinant_slope(const Edges<3, T>& e) {
+    return cross(e[2] - e[0], e[1] - e[0]);
+}
+
+// The one validity predicate, for a star in its local frame and for the whole mesh. False for NaN.
+template <int D, class T>
+inline auto is_valid(T det, T longest2) {
+    const T measure2 = D == 2 ? longest2 * longest2 : longest2 * longest2 * longest2;
+    return (det > constant<T>(0.0)) & (det * det > constant<T>(VALID * VALID) * measure2);
+}
+
+// The same for one simplex. Where its edges from one vertex tell already, the others are not looked at: they are at
+// most twice as long.
+template <int D>
+inline bool is_valid(const Edges<D>& e, double det) {
+    double longest2 = norm2(e[0]);
+    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
+    return is_valid<D>(det, 4.0 * longest2) || is_valid<D>(det, longest_edge2<D>(e));
+}
+
+// Positions in a simplex of the face opposite corner k, ordered so that (k, face) is an even permutation:
+// det(face - x) is then the determinant of the simplex with x at corner k.
+template <int D>
+inline const std::array<int, D>& opposite_face(int k) {
+    if constexpr (D == 2) {
+        static constexpr std::array<std::array<int, 2>, 3> faces{{{1, 2}, {2, 0}, {0, 1}}};
+        return faces[k];
+    } else {
+        static constexpr std::array<std::array<int, 3>, 4> faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
+        return faces[k];
+    }
+}
+
+}  // namespace meshfix

@@ -1,0 +1,121 @@
+// One star in its local frame: origin at the centroid of the neighbours, unit a power of two near its size, so
+// that scaling is exact and the kernels do not depend on the unit of length or on the offset of the mesh.
+//
+// neighbours[j]   position of neighbour j
+// faces           faces_count rows of D positions in `neighbours`, each in positive order seen from inside
+// blocks          the coordinates of the faces' vertices, LANES faces side by side for the vector units; the last
+//                 block is filled up with its last face, which changes no minimum
+// position        the free vertex
+// radius          the distance of the farthest neighbour; 0: all neighbours are in one point
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "mesh/simplex.hpp"
+
+namespace meshfix {
+
+// Views of the arrays of stars.hpp.
+struct StarsView {
+    const std::int32_t* offsets;
+    const std::uint16_t* faces;
+    const std::int32_t* neighbour_offsets;
+    const std::int32_t* neighbours;
+};
+
+// Mean of the neighbours of v, summed as differences: at a far offset the sum itself would lose digits.
+template <int D>
+inline Vec<D> centroid(const StarsView& stars, const double* points, std::int64_t v) {
+    const std::int32_t begin = stars.neighbour_offsets[v], end = stars.neighbour_offsets[v + 1];
+    const Vec<D> first = load<D>(points + static_cast<std::int64_t>(stars.neighbours[begin]) * D);
+    Vec<D> sum{};
+    for (std::int32_t i = begin + 1; i < end; ++i)
+        sum = sum + (load<D>(points + static_cast<std::int64_t>(stars.neighbours[i]) * D) - first);
+    return first + (1.0 / (end - begin)) * sum;
+}
+
+// LANES faces: coordinate c of vertex k is [k][c].
+template <int D>
+using FaceBlock = Edges<D, Pack>;
+
+template <int D>
+struct Star {
+    std::vector<Vec<D>> neighbours;
+    std::vector<FaceBlock<D>> blocks;
+    const std::uint16_t* faces = nullptr;
+    int faces_count = 0;
+    Vec<D> origin{}, position{};
+    double unit = 1.0, radius = 0.0;
+
+    void gather(const StarsView& stars, const double* points, std::int64_t v) {
+        const std::int32_t begin = stars.neighbour_offsets[v], end = stars.neighbour_offsets[v + 1];
+        faces = stars.faces + static_cast<std::int64_t>(stars.offsets[v]) * D;
+        faces_count = stars.offsets[v + 1] - stars.offsets[v];
+        origin = centroid<D>(stars, points, v);
+        neighbours.resize(end - begin);
+        double size2 = 0.0;
+        for (std::int32_t i = begin; i < end; ++i) {
+            const Vec<D> p = load<D>(points + static_cast<std::int64_t>(stars.neighbours[i]) * D) - origin;
+            neighbours[i - begin] = p;
+            size2 = std::max(size2, norm2(p));
+        }
+        int exponent = 0;
+        radius = std::frexp(std::sqrt(size2), &exponent);
+        unit = std::ldexp(1.0, exponent);
+        const double scale = 1.0 / unit;
+        for (auto& p : neighbours) p = scale * p;
+        position = scale * (load<D>(points + v * D) - origin);
+        fill_blocks();
+    }
+
+    void fill_blocks() {
+        blocks.resize((faces_count + LANES - 1) / LANES);
+        for (int i = 0; i < static_cast<int>(blocks.size()) * LANES; ++i) {
+            const std::uint16_t* face = faces + std::min(i, faces_count - 1) * D;
+            for (int k = 0; k < D; ++k)
+                for (int c = 0; c < D; ++c) blocks[i / LANES][k][c][i % LANES] = neighbours[face[k]][c];
+        }
+    }
+
+    // 1 for the faces of a block, 0 for what fills up the last one.
+    Pack weights(std::size_t block) const {
+        Pack w = constant<Pack>(1.0);
+        for (int i = 0; i < LANES; ++i)
+            if (static_cast<int>(block) * LANES + i >= faces_count) w[i] = 0.0;
+        return w;
+    }
+
+    Vec<D> to_global(const Vec<D>& x) const { return origin + unit * x; }
+    Vec<D> to_local(const Vec<D>& p) const { return (1.0 / unit) * (p - origin); }
+
+    // The nearest position that the global coordinates can hold: what is judged is what will be stored.
+    Vec<D> snap(const Vec<D>& x) const { return to_local(to_global(x)); }
+
+    // Edges from x to the vertices of face i, and of all faces of a block.
+    Edges<D> edges(int i, const Vec<D>& x) const {
+        Edges<D> e;
+        for (int k = 0; k < D; ++k) e[k] = neighbours[faces[i * D + k]] - x;
+        return e;
+    }
+    static Edges<D, Pack> edges(const FaceBlock<D>& block, const Vec<D>& x) {
+        Edges<D, Pack> e;
+        for (int k = 0; k < D; ++k)
+            for (int c = 0; c < D; ++c) e[k][c] = block[k][c] - x[c];
+        return e;
+    }
+
+    bool valid(const Vec<D>& x) const {
+        for (const auto& block : blocks) {
+            const auto e = edges(block, x);
+            const Pack ones = constant<Pack>(1.0);
+            const Pack valid = select(is_valid<D>(determinant(e), longest_edge2<D>(e)), ones, ones - 1.0);
+            for (int i = 0; i < LANES; ++i)
+                if (valid[i] == 0.0) return false;
+        }
+        return true;
+    }
+};
+
+}  // namespace meshfix

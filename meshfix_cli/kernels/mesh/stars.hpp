@@ -1,0 +1,195 @@
+// What the kernels know of a mesh: its simplices in their own order, the facets between them, and the stars around
+// its vertices in blocks, which are the unit of parallel work.
+//
+// vertices, rows, simplices        see order.hpp; all other numbers are those of this order
+// offsets (n+1), corners           the corners at each vertex; a corner is simplex * (D+1) + position
+// mates, component, against        see facets.hpp
+// neighbour_offsets (n+1), neighbours
+// faces (m*(D+1), D)               for each of `corners` the opposite face, as positions in the vertex's neighbours
+// colour_offsets, colour_blocks    blocks of one colour share no edge; block b holds the vertices from b * BLOCK_SIZE
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <stdexcept>
+#include <vector>
+
+#include "mesh/facets.hpp"
+#include "mesh/order.hpp"
+
+namespace meshfix {
+
+struct Connectivity {
+    std::vector<std::int32_t> vertices, rows, simplices, offsets, corners, mates, component;
+    std::vector<std::uint8_t> against;
+    std::int64_t crowded = -1;
+    bool orientable = true;
+    std::vector<std::int32_t> neighbour_offsets, neighbours, colour_offsets, colour_blocks;
+    std::vector<std::uint16_t> faces;
+
+    std::int64_t n() const { return static_cast<std::int64_t>(vertices.size()); }
+    std::int64_t m() const { return static_cast<std::int64_t>(rows.size()); }
+    std::int64_t blocks() const { return (n() + BLOCK_SIZE - 1) / BLOCK_SIZE; }
+};
+
+template <int D>
+Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
+                     std::vector<std::int32_t> used, int threads) {
+    Connectivity mesh;
+    Order order = order_mesh<D>(points, n, simplices, m, std::move(used), threads);
+    mesh.vertices = std::move(order.vertices);
+    mesh.rows = std::move(order.rows);
+    mesh.simplices = std::move(order.simplices);
+    Incidence csr = incidence<D>(mesh.simplices.data(), m, mesh.n(), threads);
+    Facets facets = match_facets<D>(mesh.simplices.data(), m, csr, threads);
+    mesh.crowded = facets.crowded;
+    if (mesh.crowded >= 0) return mesh;
+    mesh.offsets = std::move(csr.offsets);
+    mesh.corners = std::move(csr.corners);
+    Orientation orientation = orient<D>(facets, m, threads);
+    mesh.mates = std::move(facets.mates);
+    mesh.component = std::move(orientation.component);
+    mesh.against = std::move(orientation.against);
+    mesh.orientable = orientation.orientable;
+    return mesh;
+}
+
+// A part of a mesh that has an order already: its vertices and simplices, as they come.
+template <int D>
+Connectivity part_of_mesh(const std::int32_t* simplices, std::int64_t m, std::int64_t n, int threads) {
+    Connectivity part;
+    part.simplices.assign(simplices, simplices + m * (D + 1));
+    part.vertices.resize(n);
+    part.rows.resize(m);
+    std::iota(part.vertices.begin(), part.vertices.end(), 0);
+    std::iota(part.rows.begin(), part.rows.end(), 0);
+    Incidence csr = incidence<D>(simplices, m, n, threads);
+    part.offsets = std::move(csr.offsets);
+    part.corners = std::move(csr.corners);
+    return part;
+}
+
+// Exchanges the first two vertices of some simplices: the other orientation. Before the stars are built.
+template <int D>
+void flip(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
+    const auto moved = [&](std::int32_t corner) {
+        const std::int32_t position = corner % (D + 1);
+        return position < 2 && flipped[corner / (D + 1)] ? corner + 1 - 2 * position : corner;
+    };
+    for_each_range(mesh.m(), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (std::int64_t s = begin; s < end; ++s) {
+            if (flipped[s]) {
+                std::swap(mesh.simplices[s * (D + 1)], mesh.simplices[s * (D + 1) + 1]);
+                std::swap(mesh.mates[s * (D + 1)], mesh.mates[s * (D + 1) + 1]);
+            }
+            for (int k = 0; k <= D; ++k) {
+                std::int32_t& mate = mesh.mates[s * (D + 1) + k];
+                if (mate >= 0) mate = moved(mate);
+                mesh.corners[s * (D + 1) + k] = moved(mesh.corners[s * (D + 1) + k]);
+            }
+        }
+    });
+}
+
+// The neighbours and faces of the vertices of a block; `place` (n) is where a vertex may be in `neighbours`: it is there
+// if it is found there.
+template <int D>
+void find_neighbours(Connectivity& mesh, std::int64_t begin, std::int64_t end, std::vector<std::uint32_t>& place,
+                     std::vector<std::int32_t>& neighbours) {
+    for (std::int64_t v = begin; v < end; ++v) {
+        const std::size_t row = neighbours.size();
+        for (std::int32_t i = mesh.offsets[v]; i < mesh.offsets[v + 1]; ++i) {
+            const std::int32_t here = mesh.corners[i] % (D + 1);
+            const std::int32_t* simplex = &mesh.simplices[mesh.corners[i] - here];
+            const auto& face = opposite_face<D>(here);
+            for (int k = 0; k < D; ++k) {
+                const std::int32_t u = simplex[face[k]];
+                std::size_t at = place[u];
+                if (at < row || at >= neighbours.size() || neighbours[at] != u) {
+                    at = neighbours.size();
+                    place[u] = static_cast<std::uint32_t>(at);
+                    neighbours.push_back(u);
+                }
+                mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(at - row);
+            }
+        }
+        if (neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
+            throw std::length_error("a vertex has more than 65,535 neighbours");
+        mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(neighbours.size() - row);
+    }
+}
+
+template <int D>
+void build_neighbours(Connectivity& mesh, int threads) {
+    mesh.faces.resize(mesh.corners.size() * D);
+    mesh.neighbour_offsets.assign(mesh.n() + 1, 0);
+    std::vector<std::vector<std::int32_t>> found(mesh.blocks());
+    Spares<std::vector<std::uint32_t>> places;
+    for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
+        places.with([&](std::vector<std::uint32_t>& place) {
+            place.resize(mesh.n());
+            find_neighbours<D>(mesh, begin, end, place, found[block]);
+        });
+    });
+    std::int64_t total = 0;
+    for (std::int64_t v = 0; v < mesh.n(); ++v) {
+        total += mesh.neighbour_offsets[v + 1];
+        if (total > std::numeric_limits<std::int32_t>::max())
+            throw std::length_error("the mesh has more than a billion edges");
+        mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(total);
+    }
+    mesh.neighbours.resize(total);
+    for_each_item(mesh.blocks(), threads, [&](std::int64_t block) {
+        std::copy(found[block].begin(), found[block].end(),
+                  mesh.neighbours.begin() + mesh.neighbour_offsets[block * BLOCK_SIZE]);
+        std::vector<std::int32_t>().swap(found[block]);
+    });
+}
+
+// Greedy, in the order of the blocks.
+inline void colour_blocks(Connectivity& mesh, int threads) {
+    std::vector<std::vector<std::int32_t>> touching(mesh.blocks());  // the blocks before each that touch it
+    for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
+        auto& others = touching[block];
+        for (std::int32_t i = mesh.neighbour_offsets[begin]; i < mesh.neighbour_offsets[end]; ++i) {
+            const auto other = static_cast<std::int32_t>(mesh.neighbours[i] / BLOCK_SIZE);
+            if (other < block && (others.empty() || others.back() != other)) others.push_back(other);
+        }
+    });
+    std::vector<std::int32_t> colour(mesh.blocks()), forbidden_by;
+    for (std::int32_t block = 0; block < mesh.blocks(); ++block) {
+        for (std::int32_t other : touching[block]) forbidden_by[colour[other]] = block;
+        std::size_t c = 0;
+        while (c < forbidden_by.size() && forbidden_by[c] == block) ++c;
+        if (c == forbidden_by.size()) forbidden_by.push_back(-1);
+        colour[block] = static_cast<std::int32_t>(c);
+    }
+    mesh.colour_offsets.assign(1, 0);
+    for (std::int32_t c = 0; c < static_cast<std::int32_t>(forbidden_by.size()); ++c) {
+        for (std::int32_t block = 0; block < mesh.blocks(); ++block)
+            if (colour[block] == c) mesh.colour_blocks.push_back(block);
+        mesh.colour_offsets.push_back(static_cast<std::int32_t>(mesh.colour_blocks.size()));
+    }
+}
+
+template <int D>
+void build_stars(Connectivity& mesh, int threads) {
+    build_neighbours<D>(mesh, threads);
+    colour_blocks(mesh, threads);
+}
+
+// Marks the vertices of all simplices that have a marked one.
+template <int D>
+void grow(const Connectivity& mesh, std::vector<std::uint8_t>& marked) {
+    const std::vector<std::uint8_t> before = marked;
+    for (std::int64_t s = 0; s < mesh.m(); ++s) {
+        const std::int32_t* simplex = &mesh.simplices[s * (D + 1)];
+        bool any = false;
+        for (int k = 0; k <= D; ++k) any |= before[simplex[k]] != 0;
+        if (!any) continue;
+        for (int k = 0; k <= D; ++k) marked[simplex[k]] = 1;
+    }
+}
+
+}  // namespace meshfix

@@ -1,0 +1,17 @@
+// Built once for any processor and, where the compiler can, once for those with wider vectors; see __init__.py.
+#include "arrays.hpp"
+#include "common/pack.hpp"
+
+#define MODULE(name, variable) NB_MODULE(name, variable)
+MODULE(MESHFIX_MODULE, m) {
+#if defined(__x86_64__) && defined(__GNUC__)
+    m.def("has_avx2", [] { return __builtin_cpu_supports("avx2") != 0; });
+#else
+    m.def("has_avx2", [] { return false; });
+#endif
+    m.attr("LANES") = meshfix::LANES;
+    meshfix::bind_mesh(m);
+    meshfix::bind_measures(m);
+    meshfix::bind_moves(m);
+    meshfix::bind_text(m);
+}

@@ -1,0 +1,168 @@
+// Bindings of the moves of vertices, of what each of them computes, and of the foldover-free energy.
+#include <variant>
+
+#include "measures/python.hpp"
+#include "mesh/python.hpp"
+#include "moves/foldover.hpp"
+#include "moves/relocate.hpp"
+
+namespace meshfix {
+
+namespace {
+
+auto mean_ratio_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+                   const Vector<const double>& x) {
+    const std::size_t d = neighbours.shape(1);
+    auto [value, again, gradient, hessian] = with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        const Star<D> star = make_star<D>(neighbours, faces, x.data());
+        const MeanRatio<D> ratio(star, star.position);
+        std::vector<double> rows;
+        for (int i = 0; i < D; ++i)
+            for (int j = 0; j < D; ++j) rows.push_back(ratio.hessian[std::max(i, j)][std::min(i, j)]);
+        return std::make_tuple(ratio.value, MeanRatio<D>::at(star, star.position),
+                               std::vector<double>(ratio.gradient.begin(), ratio.gradient.end()), rows);
+    });
+    return std::make_tuple(value, again, to_numpy(std::move(gradient)), to_numpy(std::move(hessian), d));
+}
+
+auto mean_angle_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+                   const Vector<const double>& x) {
+    return with_dimension(neighbours.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const Star<D> star = make_star<D>(neighbours, faces, x.data());
+        MeanAngle<D> angle;
+        angle.allowed.assign(star.blocks.size(), constant<Pack>(1.0));
+        const Vec<D> slope = MeanAngle<D>::slope(star, star.position);
+        return std::make_pair(angle.at(star, star.position), std::vector<double>(slope.begin(), slope.end()));
+    });
+}
+
+auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
+                 const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
+                 const Matrix<const double>& start, double max_move, int threads) {
+    const Connectivity& mesh = self.mesh;
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    check_points(points, self);
+    check_points(start, self);
+    if (static_cast<std::int64_t>(states.shape(0)) != mesh.n()) throw nb::value_error("the states are of another mesh");
+    const Counts counts = with_dimension(points.shape(1), [&](auto d) {
+        return relocate<d>(static_cast<Move>(move), stars_of(mesh), points.data(), states.data(), mesh.n(), blocks.data(),
+                           static_cast<std::int64_t>(blocks.shape(0)),
+                           Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
+    });
+    return std::make_pair(counts.visited, counts.moved);
+}
+
+// Vertices that others moved: where one is elsewhere, its neighbours are due again.
+void receive_py(const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
+                const Vector<const std::int32_t>& vertices, const Matrix<const double>& positions) {
+    const Connectivity& mesh = self.mesh;
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    check_points(points, self);
+    const std::size_t d = points.shape(1);
+    for (std::size_t i = 0; i < vertices.shape(0); ++i) {
+        double* here = points.data() + static_cast<std::size_t>(vertices(i)) * d;
+        const double* there = positions.data() + i * d;
+        const bool moved = !std::equal(here, here + d, there);
+        std::copy(there, there + d, here);  // also 0 over -0
+        if (moved) make_neighbours_due(stars_of(mesh), states.data(), vertices(i));
+    }
+}
+
+template <int D>
+auto solve_star(const Star<D>& star, bool heights) {
+    LinearProgram<D> program;
+    program.set(star, heights);
+    const LpStatus status = program.solve();
+    std::vector<double> weights(star.faces_count + 2 * D, 0.0);
+    if (status != LpStatus::degenerate)
+        for (int row = 0; row <= D; ++row) {
+            const int j = program.basis[row], side = j - program.faces_count;
+            int face = std::min(j, star.faces_count - 1);
+            if (program.stand_in >= 0 && program.column(j) == program.column(program.stand_in)) face = program.stand_in;
+            weights[side < 0 ? face : star.faces_count + side] += program.weight(row);
+        }
+    const Vec<D> x = program.position();
+    std::vector<double> solution(x.begin(), x.end()), frame;
+    solution.push_back(program.pi[D]);
+    for (const auto& axis : program.frame) frame.insert(frame.end(), axis.begin(), axis.end());
+    return std::make_tuple(static_cast<int>(status), std::move(solution), std::move(weights), std::move(frame),
+                           program.pivots);
+}
+
+auto linear_program_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
+                       bool heights) {
+    const std::size_t dimension = neighbours.shape(1);
+    auto [status, solution, weights, frame, pivots] = with_dimension(dimension, [&](auto d) {
+        return solve_star<d>(make_star<d>(neighbours, faces, std::array<double, 3>{}.data()), heights);
+    });
+    return std::make_tuple(status, to_numpy(std::move(solution)), to_numpy(std::move(weights)),
+                           to_numpy(std::move(frame), dimension), pivots);
+}
+
+auto min_norm_point_py(const Matrix<const double>& vectors) {
+    const std::size_t d = vectors.shape(1);
+    return to_numpy(with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        std::vector<Vec<D>> rows;
+        for (std::size_t i = 0; i < vectors.shape(0); ++i) rows.push_back(load<D>(vectors.data() + i * D));
+        const Vec<D> point = min_norm_point<D>(rows);
+        return std::vector<double>(point.begin(), point.end());
+    }));
+}
+
+// Holds the connectivity of one minimisation.
+struct PyFoldover {
+    std::variant<Foldover<2>, Foldover<3>> energy;
+};
+
+void init_foldover(PyFoldover* self, const Matrix<const std::int32_t>& simplices, std::int64_t n) {
+    const auto m = static_cast<std::int64_t>(simplices.shape(0));
+    if (simplices.shape(1) == 3) {
+        new (self) PyFoldover{Foldover<2>(simplices.data(), m, n)};
+    } else {
+        new (self) PyFoldover{Foldover<3>(simplices.data(), m, n)};
+    }
+}
+
+auto evaluate_py(PyFoldover& self, const Matrix<const double>& points, const Vector<const double>& sizes, double eps,
+                 double weight, std::int64_t free, int threads) {
+    const std::size_t d = points.shape(1);
+    std::vector<double> gradient(static_cast<std::size_t>(free) * d);
+    EnergyValue value;
+    {
+        const nb::gil_scoped_release release;
+        value = std::visit(
+            [&](auto& energy) {
+                return energy.evaluate(points.data(), sizes.data(), Regularisation{eps, weight}, free,
+                                       gradient.data(), threads);
+            },
+            self.energy);
+    }
+    return std::make_tuple(value.energy, to_numpy(std::move(gradient), d), value.min_det);
+}
+
+}  // namespace
+
+void bind_moves(nb::module_& m) {
+    m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a,
+          "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
+          "threads"_a);
+    m.def("receive", &receive_py, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a, "vertices"_a.noconvert(),
+          "positions"_a.noconvert());
+    m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
+    m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
+    m.def("mean_angle", &mean_angle_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.attr("DUE") = DUE;
+
+    nb::class_<PyFoldover>(m, "Foldover")
+        .def("__init__", &init_foldover, "simplices"_a.noconvert(), "n"_a)
+        .def("evaluate", &evaluate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a,
+             "threads"_a);
+
+    static_assert(static_cast<int>(Move::mean_angle) == 8, "the codes of strategies.Move");
+}
+
+}  // namespace meshfix

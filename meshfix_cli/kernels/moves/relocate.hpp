@@ -1,0 +1,222 @@
+// One call relocates the vertices of one colour class of blocks, in order inside a block (Gauss-Seidel), the
+// blocks over threads. Blocks of one colour share no edge, so the result does not depend on the threads.
+#pragma once
+
+#include "common/parallel.hpp"
+#include "mesh/order.hpp"
+#include "moves/active_set.hpp"
+#include "moves/laplacian.hpp"
+#include "moves/linear_program.hpp"
+#include "moves/mean_angle.hpp"
+#include "moves/mean_ratio.hpp"
+
+namespace meshfix {
+
+enum class Move : int {
+    laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
+    mean_angle
+};
+
+struct Parameters {
+    double threshold_sine2;  // the active-set method runs on stars below it; for the means: the floor
+    double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
+    const double* start;     // (n, D): where the vertices came from
+    double max_move;         // how far from there they may be; infinity: anywhere
+};
+
+// What a sweep knows of each vertex. One is due until it has been visited, and again when it or a neighbour moves:
+// elsewhere a visit would find what the last one did.
+constexpr std::uint8_t HELD = 0, DONE = 1, DUE = 2;
+
+// Blocks of one colour may have neighbours in common, but read none of their states.
+inline void make_neighbours_due(const StarsView& stars, std::uint8_t* states, std::int64_t v) {
+    for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
+        std::uint8_t& state = states[stars.neighbours[i]];
+        if (load_relaxed(state) == DONE) store_relaxed(state, DUE);
+    }
+}
+
+struct Counts {
+    std::int64_t visited = 0, moved = 0;
+};
+
+template <int D>
+struct Relocation {
+    StarsView stars;
+    double* points;        // (n, D), moved in place
+    std::uint8_t* states;  // (n) HELD, DONE or DUE
+    Parameters parameters;
+
+    Star<D> star{};
+    LinearProgram<D> program{};
+    ActiveSet<D> active_set{};
+    MeanAngle<D> mean_angle{};
+
+    bool store(std::int64_t v, const Vec<D>& x) {
+        const bool changed = place(v, x);
+        if (changed) make_due(v);
+        return changed;
+    }
+
+    bool place(std::int64_t v, Vec<D> x) {
+        if (parameters.max_move < INFINITY) x = within_reach(v, x);
+        bool changed = false;
+        for (int k = 0; k < D; ++k) {
+            changed |= points[v * D + k] != x[k];
+            points[v * D + k] = x[k];
+        }
+        return changed;
+    }
+
+    void make_due(std::int64_t v) const {
+        if (states[v] != HELD) states[v] = DUE;
+        make_neighbours_due(stars, states, v);
+    }
+
+    // The last point in reach on the way to x. The smallest measure is concave (theorem 2.1) and the level sets of
+    // the smallest sine are convex (3.2): on the way to a better position every point is no worse than the first.
+    Vec<D> within_reach(std::int64_t v, const Vec<D>& x) const {
+        const Vec<D> start = load<D>(parameters.start + v * D), from = load<D>(points + v * D), way = x - from;
+        const double reach2 = parameters.max_move * parameters.max_move;
+        if (norm2(x - start) <= reach2) return x;
+        const Vec<D> off = from - start;
+        const double b = dot(off, way), a = norm2(way), c = std::min(0.0, norm2(off) - reach2);
+        double share = (std::sqrt(b * b - a * c) - b) / a;
+        for (int trial = 0; trial < 60; ++trial, share *= 1.0 - std::ldexp(1e-15, trial)) {
+            const Vec<D> last = from + share * way;
+            if (norm2(last - start) <= reach2) return last;
+        }
+        return from;
+    }
+
+    // To the optimum of the linear programme. Also where the smallest measure stays the same: of many optima the
+    // move to another is what frees collapsed clusters in a later sweep.
+    bool untangle(std::int64_t v) {
+        program.set(star, false);
+        if (program.solve() != LpStatus::optimal) return false;
+        return store(v, star.to_global(program.position()));
+    }
+
+    // The largest smallest height where that makes the star valid, else the largest smallest measure: heights alone
+    // diverge on hard tangles.
+    bool untangle_heights(std::int64_t v) {
+        program.set(star, true);
+        if (program.solve() != LpStatus::optimal || !(program.pi[D] > 0.0)) return untangle(v);
+        return store(v, star.to_global(program.position()));
+    }
+
+    // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
+    bool combined_untangle(std::int64_t v) {
+        const bool moved = store(v, star.origin);
+        star.position = star.to_local(load<D>(points + v * D));
+        return (star.valid(star.position) ? false : untangle(v)) || moved;
+    }
+
+    // Section 3.3: smart Laplacian first, the active-set method where the star stays below the threshold. A cluster
+    // pinched almost flat holds that up; the linear programme frees it.
+    bool smooth(std::int64_t v, bool optimise) {
+        double quality = min_sine2<D>(star, star.position, 0.0);
+        if (!(quality > 0.0)) return false;  // only valid stars are smoothed
+        return take(v, smoothed(quality, optimise));
+    }
+
+    // The active-set method where the star is below the threshold, nothing elsewhere.
+    bool raise_smallest(std::int64_t v) {
+        double quality = min_sine2<D>(star, star.position, 0.0);
+        if (!(quality > 0.0 && quality < parameters.threshold_sine2)) return false;
+        return take(v, smoothed(quality, true));
+    }
+
+    bool smooth_mean(std::int64_t v, bool angle) {
+        const double quality = min_sine2<D>(star, star.position, 0.0), floor = parameters.threshold_sine2;
+        if (!(quality > 0.0)) return false;
+        const auto reachable = [&](const Vec<D>& x) {
+            const Vec<D> there = star.to_global(x);
+            return star.to_local(parameters.max_move < INFINITY ? within_reach(v, there) : there);
+        };
+        return take(v, angle ? mean_angle.improve(star, quality, floor, reachable)
+                             : improve_mean_ratio<D>(star, quality, floor, reachable));
+    }
+
+    Vec<D> smoothed(double quality, bool optimise) {
+        Vec<D> x = smart_laplacian(star, quality);
+        if (optimise && quality < LP_PINCHED_SINE2) x = smart_programme(x, quality);
+        if (optimise && quality < parameters.threshold_sine2) x = active_set.improve(star, x, quality);
+        return x;
+    }
+
+    bool take(std::int64_t v, const Vec<D>& x) {
+        return x == star.position || makes_smaller(x) ? false : store(v, star.to_global(x));
+    }
+
+    // To the largest smallest height, where that raises the smallest sine.
+    Vec<D> smart_programme(const Vec<D>& x, double& quality) {
+        program.set(star, true);
+        if (program.solve() != LpStatus::optimal) return x;
+        const Vec<D> trial = star.snap(program.position());
+        const double there = min_sine2<D>(star, trial, quality);
+        if (!(there > quality)) return x;
+        quality = there;
+        return trial;
+    }
+
+    bool makes_smaller(const Vec<D>& x) const {
+        if (parameters.min_det == -INFINITY) return false;
+        const double after = min_det(x), scale = D == 2 ? star.unit * star.unit : star.unit * star.unit * star.unit;
+        return after * scale < parameters.min_det && after < min_det(star.position);
+    }
+
+    double min_det(const Vec<D>& x) const {
+        double smallest = INFINITY;
+        for (int i = 0; i < star.faces_count; ++i) smallest = std::min(smallest, determinant(star.edges(i, x)));
+        return smallest;
+    }
+
+    void relocate(Move move, std::int64_t v, Counts& counts) {
+        ++counts.visited;
+        if (move == Move::laplacian) {  // nearly all move: all stay due
+            counts.moved += place(v, centroid<D>(stars, points, v));
+            return;
+        }
+        states[v] = DONE;
+        star.gather(stars, points, v);
+        switch (move) {
+            case Move::untangle: counts.moved += untangle(v); break;
+            case Move::combined_untangle: counts.moved += combined_untangle(v); break;
+            case Move::smart_laplacian: counts.moved += smooth(v, false); break;
+            case Move::combined_smooth: counts.moved += smooth(v, true); break;
+            case Move::untangle_heights: counts.moved += untangle_heights(v); break;
+            case Move::mean_ratio: counts.moved += smooth_mean(v, false); break;
+            case Move::raise_smallest: counts.moved += raise_smallest(v); break;
+            case Move::mean_angle: counts.moved += smooth_mean(v, true); break;
+            case Move::laplacian: break;
+        }
+    }
+};
+
+// blocks (count): numbers of the blocks to visit, of one colour.
+template <int D>
+Counts relocate(Move move, const StarsView& stars, double* points, std::uint8_t* states, std::int64_t n,
+                const std::int32_t* blocks, std::int64_t count, const Parameters& parameters, int threads) {
+    std::vector<Counts> counts(count);
+    for_each_item(count, threads, [&](std::int64_t item) {
+        thread_local Relocation<D> work;
+        work.stars = stars;
+        work.points = points;
+        work.states = states;
+        work.parameters = parameters;
+        Counts mine;  // of its own: threads that write side by side in memory wait for one another
+        const std::int64_t begin = blocks[item] * BLOCK_SIZE;
+        for (std::int64_t v = begin; v < std::min(n, begin + BLOCK_SIZE); ++v)
+            if (states[v] == DUE) work.relocate(move, v, mine);
+        counts[item] = mine;
+    });
+    Counts total;
+    for (const auto& c : counts) {
+        total.visited += c.visited;
+        total.moved += c.moved;
+    }
+    return total;
+}
+
+}  // namespace meshfix

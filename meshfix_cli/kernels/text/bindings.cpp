@@ -1,0 +1,145 @@
+// Bindings of what finds, reads and replaces numbers in texts.
+#include <numeric>
+
+#include "arrays.hpp"
+#include "text/text.hpp"
+
+namespace meshfix {
+
+namespace {
+
+std::string_view view_of(const nb::bytes& data) { return {data.c_str(), data.size()}; }
+
+std::string_view word_at(std::string_view text, const std::int64_t* span) {
+    const auto size = static_cast<std::int64_t>(text.size());
+    if (span[0] < 0 || span[1] < span[0] || span[1] > size) return {};
+    return text.substr(static_cast<std::size_t>(span[0]), static_cast<std::size_t>(span[1] - span[0]));
+}
+
+auto find_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    return to_numpy(find_words(view_of(data), at, count, text_threads), 2);
+}
+
+auto line_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t count) {
+    const std::string_view text = view_of(data);
+    std::vector<std::int64_t> spans;
+    for (std::size_t i = 0; i < offsets.shape(0); ++i) {
+        Span word{offsets(i), offsets(i)};
+        for (std::int64_t j = 0; j < count; ++j) {
+            if (word.end >= 0) word = next_word(text, word.end, true);
+            spans.insert(spans.end(), {word.begin, word.end});
+        }
+    }
+    return to_numpy(std::move(spans), 2);
+}
+
+std::int64_t behind_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    return behind_words(view_of(data), at, count, text_threads);
+}
+
+template <class T>
+nb::tuple integers_of(Integers<T>&& read) {
+    return nb::make_tuple(to_numpy(std::move(read.values)), read.end, read.bad);
+}
+
+// In 32 bits where that is enough.
+nb::tuple scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    auto read = read_integers<std::int32_t>(view_of(data), at, count, text_threads);
+    if (read.fit) return integers_of(std::move(read));
+    return integers_of(read_integers<std::int64_t>(view_of(data), at, count, text_threads));
+}
+
+template <class Real, class Value, class Read>
+auto read_words(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const Read& read) {
+    const std::string_view text = view_of(data);
+    const auto count = static_cast<std::int64_t>(spans.shape(0));
+    std::vector<Value> values(spans.shape(0));
+    std::vector<std::int64_t> bad(count / PER_ITEM + 1, -1);
+    for_each_range(count, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t i = begin; i < end && bad[item] < 0; ++i) {
+            Real value{};
+            if (!read(word_at(text, spans.data() + 2 * i), value)) bad[item] = i;
+            values[i] = static_cast<Value>(value);
+        }
+    });
+    const auto first = std::find_if(bad.begin(), bad.end(), [](std::int64_t row) { return row >= 0; });
+    return std::make_pair(to_numpy(std::move(values)), first == bad.end() ? -1 : *first);
+}
+
+auto integers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, bool slash) {
+    return read_words<std::int64_t, std::int64_t>(
+        data, spans, [slash](std::string_view word, std::int64_t& value) { return read_integer(word, value, slash); });
+}
+
+auto numbers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, bool single) {
+    return single ? read_words<float, double>(data, spans, read_number<float>)
+                  : read_words<double, double>(data, spans, read_number<double>);
+}
+
+auto shortest_py(const Vector<const double>& values, bool single, int longest) {
+    const auto count = static_cast<std::int64_t>(values.shape(0));
+    std::vector<std::string> parts(count / PER_ITEM + 1);
+    std::vector<std::int64_t> spans(2 * count);
+    for_each_range(count, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t i = begin; i < end; ++i) {
+            spans[2 * i] = static_cast<std::int64_t>(parts[item].size());
+            parts[item] += single ? shortest(static_cast<float>(values(i)), longest) : shortest(values(i), longest);
+            spans[2 * i + 1] = static_cast<std::int64_t>(parts[item].size());
+        }
+    });
+    std::string words;
+    for (std::size_t item = 0; item < parts.size(); ++item) {
+        const std::int64_t end = std::min<std::int64_t>(count, (item + 1) * PER_ITEM);
+        for (std::int64_t i = 2 * item * PER_ITEM; i < 2 * end; ++i) spans[i] += static_cast<std::int64_t>(words.size());
+        words += parts[item];
+    }
+    return std::make_pair(nb::bytes(words.data(), words.size()), to_numpy(std::move(spans), 2));
+}
+
+// A span that is not in the text counts as empty, and so where it is put.
+nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const nb::bytes& words,
+                     const Matrix<const std::int64_t>& word_spans) {
+    const std::string_view text = view_of(data), replacements = view_of(words);
+    const auto count = static_cast<std::int64_t>(spans.shape(0));
+    const auto word = [&](std::int64_t i) { return word_at(replacements, word_spans.data() + 2 * i); };
+    const auto before = [&](std::int64_t i) {  // what stays in front of span i; of `count`, what is left
+        const std::int64_t kept[2] = {i > 0 ? spans(i - 1, 1) : 0,
+                                      i < count ? spans(i, 0) : static_cast<std::int64_t>(text.size())};
+        return word_at(text, kept);
+    };
+    std::vector<std::int64_t> starts(count / PER_ITEM + 2, 0);  // where in the result each item begins
+    for (std::int64_t i = 0; i < count; ++i) {
+        if (spans(i, 0) < (i > 0 ? spans(i - 1, 1) : 0)) throw nb::value_error("the spans overlap or are not in order");
+        starts[i / PER_ITEM + 1] += static_cast<std::int64_t>(before(i).size() + word(i).size());
+    }
+    starts.back() += static_cast<std::int64_t>(before(count).size());
+    std::partial_sum(starts.begin(), starts.end(), starts.begin());
+    auto result = nb::steal<nb::bytes>(PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(starts.back())));
+    if (!result.is_valid()) nb::raise_python_error();
+    char* out = PyBytes_AsString(result.ptr());
+    for_each_range(count + 1, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        char* to = out + starts[item];
+        const auto put = [&to](std::string_view part) { to = std::copy(part.begin(), part.end(), to); };
+        for (std::int64_t i = begin; i < end; ++i) {
+            put(before(i));
+            if (i < count) put(word(i));
+        }
+    });
+    return result;
+}
+
+}  // namespace
+
+void bind_text(nb::module_& m) {
+    m.def("find_words", &find_words_py, "data"_a, "at"_a, "count"_a);
+    m.def("line_words", &line_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a);
+    m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
+    m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);
+    m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
+    m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert(), "slash"_a);
+    m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
+    m.def("shortest", &shortest_py, "values"_a.noconvert(), "single"_a, "longest"_a);
+    m.def("replace", &replace_py, "data"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());
+}
+
+}  // namespace meshfix

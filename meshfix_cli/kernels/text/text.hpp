@@ -1,0 +1,250 @@
+// Numbers in text files: where they are, what they say, and the shortest text for one.
+//
+// A word is a run of bytes that are neither blanks, control characters nor commas. A span is the offset of its first
+// byte and the offset behind its last. Nothing here allocates by what a file announces.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/parallel.hpp"
+
+namespace meshfix {
+
+struct Span {
+    std::int64_t begin = -1, end = -1;
+};
+
+inline bool separates(char c) { return static_cast<unsigned char>(c) <= ' ' || c == ','; }
+inline bool ends_line(char c) { return c == '\n' || c == '\r'; }
+
+// The first word at or behind `at`; none in the rest of the text, or of the line: begin = -1.
+inline Span next_word(std::string_view text, std::int64_t at, bool one_line) {
+    const auto size = static_cast<std::int64_t>(text.size());
+    for (; at < size && separates(text[at]); ++at)
+        if (one_line && ends_line(text[at])) return {};
+    if (at >= size) return {};
+    Span word{at, at};
+    while (word.end < size && !separates(text[word.end])) ++word.end;
+    return word;
+}
+
+// The words from an offset on, in pieces for threads.
+struct Pieces {
+    std::vector<std::int64_t> begin, first;  // of each piece and of the end: its offset, and the number of its first word
+
+    std::int64_t pieces() const { return static_cast<std::int64_t>(begin.size()) - 1; }
+    std::int64_t words() const { return first.back(); }
+    // Where to look for the first word of a piece: behind one that began in the piece before.
+    std::int64_t first_word(std::string_view text, std::int64_t piece) const {
+        std::int64_t at = begin[piece];
+        if (piece > 0 && !separates(text[at - 1]))
+            while (at < begin[piece + 1] && !separates(text[at])) ++at;
+        return at;
+    }
+};
+
+// How many words begin in a part of the text; `at` is where all of them begin.
+inline std::int64_t count_words(std::string_view text, std::int64_t at, std::int64_t begin, std::int64_t end) {
+    std::int64_t count = begin < end && !separates(text[begin]) && (begin == at || separates(text[begin - 1]));
+    for (std::int64_t i = begin + 1; i < end; ++i) count += separates(text[i - 1]) & !separates(text[i]);
+    return count;
+}
+
+// As many pieces as it takes to have `count` words, or all there are.
+inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    constexpr std::int64_t LARGE = 1 << 18;
+    const auto size = static_cast<std::int64_t>(text.size());
+    const std::int64_t piece = std::clamp<std::int64_t>(8 * std::clamp<std::int64_t>(count, 0, size), 64, LARGE);
+    if (piece < LARGE) threads = 1;  // it is not worth the while
+    Pieces pieces{{at}, {0}};
+    while (pieces.words() < count && pieces.begin.back() < size) {
+        const std::int64_t begin = pieces.begin.back(), left = (size - begin + piece - 1) / piece;
+        const std::int64_t batch = std::min<std::int64_t>(left, 4 * threads);
+        std::vector<std::int64_t> counts(batch);
+        for_each_item(batch, threads, [&](std::int64_t i) {
+            counts[i] = count_words(text, at, begin + i * piece, std::min(size, begin + (i + 1) * piece));
+        });
+        for (std::int64_t i = 0; i < batch && pieces.words() < count; ++i) {
+            pieces.begin.push_back(std::min(size, begin + (i + 1) * piece));
+            pieces.first.push_back(pieces.words() + counts[i]);
+        }
+    }
+    return pieces;
+}
+
+// Calls f(piece, at, first, last) for each piece: where its own words begin, and their numbers, below `count`.
+template <class F>
+void for_each_piece(std::string_view text, const Pieces& pieces, std::int64_t count, int threads, const F& f) {
+    for_each_item(pieces.pieces(), threads, [&](std::int64_t p) {
+        f(p, pieces.first_word(text, p), pieces.first[p], std::min(count, pieces.first[p + 1]));
+    });
+}
+
+// The spans of the words from an offset on, as many as there are, at most `count`.
+inline std::vector<std::int64_t> find_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    const Pieces pieces = cut(text, at, count, threads);
+    std::vector<std::int64_t> spans(2 * std::clamp<std::int64_t>(count, 0, pieces.words()));
+    for_each_piece(text, pieces, count, threads, [&](std::int64_t, std::int64_t at, std::int64_t first, std::int64_t last) {
+        for (std::int64_t i = first; i < last; ++i) {
+            const Span word = next_word(text, at, false);
+            spans[2 * i] = word.begin;
+            spans[2 * i + 1] = at = word.end;
+        }
+    });
+    return spans;
+}
+
+// The offset behind the next `count` words; -1: there are fewer.
+inline std::int64_t behind_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    const Pieces pieces = cut(text, at, count, threads);
+    if (pieces.words() < count) return -1;
+    if (count <= 0) return at;
+    const std::int64_t last = pieces.pieces() - 1;
+    at = pieces.first_word(text, last);
+    for (std::int64_t i = pieces.first[last]; i < count; ++i) at = next_word(text, at, false).end;
+    return at;
+}
+
+// A number may begin with a plus, of which from_chars does not know.
+inline std::string_view without_plus(std::string_view word) {
+    return word.size() > 1 && word[0] == '+' && word[1] != '-' ? word.substr(1) : word;
+}
+
+// Reads an integer that is the word or, with `slash`, what stands before its first slash (the corners of .obj).
+inline bool read_integer(std::string_view word, std::int64_t& value, bool slash) {
+    word = without_plus(word);
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    return error == std::errc() && (end == word.data() + word.size() || (slash && *end == '/'));
+}
+
+// Finds the next word and reads it, if it is a plain integer of at most 18 digits, in one pass; false: it is none, and
+// `at` stays.
+inline bool read_plain_integer(std::string_view text, std::int64_t& at, std::int64_t& value) {
+    const char *p = text.data() + at, *const end = text.data() + text.size();
+    while (p < end && separates(*p)) ++p;
+    const bool minus = p < end && *p == '-';
+    p += minus;
+    const char* const digits = p;
+    value = 0;
+    for (; p < end && p - digits < 18; ++p) {
+        const unsigned digit = static_cast<unsigned char>(*p) - unsigned{'0'};
+        if (digit > 9) break;
+        value = 10 * value + digit;
+    }
+    if (p == digits || (p < end && !separates(*p))) return false;
+    if (minus) value = -value;
+    at = p - text.data();
+    return true;
+}
+
+// Integers of the words from an offset on, in the type T: as many as there are in a row, at most `count`.
+template <class T>
+struct Integers {
+    std::vector<T> values;
+    std::int64_t end;      // behind the last
+    std::int64_t bad = -1; // the offset of what is not an integer, or the size of the text where words are missing
+    bool fit = true;       // all are numbers of the type
+};
+
+template <class T>
+Integers<T> read_integers(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    struct Part {
+        std::int64_t bad = -1, end = -1, read = 0;
+        bool fit = true;
+    };
+    const Pieces pieces = cut(text, at, count, threads);
+    Integers<T> result{{}, at};
+    result.values.resize(std::clamp<std::int64_t>(count, 0, pieces.words()));
+    std::vector<Part> parts(pieces.pieces());
+    for_each_piece(text, pieces, count, threads, [&](std::int64_t p, std::int64_t at, std::int64_t first, std::int64_t last) {
+        Part part;
+        for (std::int64_t i = first; i < last; ++i, ++part.read) {
+            std::int64_t value = 0;
+            if (!read_plain_integer(text, at, value)) {
+                const Span word = next_word(text, at, false);
+                if (!read_integer(text.substr(word.begin, word.end - word.begin), value, false)) {
+                    part.bad = word.begin;
+                    break;
+                }
+                at = word.end;
+            }
+            result.values[i] = static_cast<T>(value);
+            part.fit &= result.values[i] == value;
+            part.end = at;
+        }
+        parts[p] = part;
+    });
+    std::int64_t read = 0;
+    for (const Part& part : parts) {
+        read += part.read;
+        result.fit &= part.fit;
+        if (part.end >= 0) result.end = part.end;
+        if (part.bad >= 0) {
+            result.bad = part.bad;
+            break;
+        }
+    }
+    if (result.bad < 0 && read < count) result.bad = static_cast<std::int64_t>(text.size());
+    result.values.resize(read);
+    return result;
+}
+
+// The slow way: Fortran's exponents, numbers too large or too small, and libraries without from_chars.
+template <class Real>
+bool read_number_slowly(std::string_view word, Real& value) {
+    std::string copy(word);
+    for (char& c : copy)
+        if (c == 'd' || c == 'D') c = 'e';
+    if (copy.empty() || copy.find_first_not_of("+-.0123456789eEinfatyINFATY") != std::string::npos) return false;
+    char* end = nullptr;
+    value = sizeof(Real) == 4 ? static_cast<Real>(std::strtof(copy.c_str(), &end))
+                              : static_cast<Real>(std::strtod(copy.c_str(), &end));
+    return end == copy.c_str() + copy.size();
+}
+
+// Reads the nearest number of the type.
+template <class Real>
+bool read_number(std::string_view word, Real& value) {
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+    const std::string_view digits = without_plus(word);
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error == std::errc() && end == digits.data() + digits.size()) return true;
+#endif
+    return read_number_slowly(word, value);
+}
+
+template <class Real>
+std::string with_digits(Real value, int digits) {
+    char buffer[40];
+    return {buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof buffer, "%.*g", digits, double(value)))};
+}
+
+// The shortest text that reads back to the value; where that is longer than `longest` (0: no limit), the most digits
+// that fit.
+template <class Real>
+std::string shortest(Real value, int longest) {
+    std::string text;
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+    char buffer[64];
+    text.assign(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+#else
+    Real back{};
+    for (int digits = 1; digits <= 17; ++digits) {
+        text = with_digits(value, digits);
+        if (read_number_slowly(text, back) && back == value) break;
+    }
+#endif
+    for (int digits = 17; longest > 0 && static_cast<int>(text.size()) > longest && digits > 0; --digits)
+        text = with_digits(value, digits);
+    return text;
+}
+
+}  // namespace meshfix

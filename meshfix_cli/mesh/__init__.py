@@ -1,0 +1,1 @@
+"""What a mesh is: its elements, its topology, its points."""

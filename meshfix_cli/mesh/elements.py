@@ -1,0 +1,181 @@
+"""The one table of element types: what they are called, what their facets are, and which of them are solved for.
+
+A type that is known and not judged is held where it stands beside elements that are. Corner nodes have the order of
+gmsh, which is that of VTK's parametric coordinates. Light to import.
+
+Source: VTK, "vtkCellType.h" and its classes of cells; "Gmsh Reference Manual", section "Node ordering"; for the weights
+Stimpson, Ernst, Knupp, Pebay, Thompson, "The Verdict Geometric Quality Library", SAND2007-1751.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+Rows = tuple[tuple[int, ...], ...]
+MEASURES = {1: "length", 2: "area", 3: "volume"}
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What the types of one shape have in common, whatever their order.
+
+    Attributes
+    ----------
+    name, plural : str
+    dimension : int
+    corners : int
+        Number of corner nodes; 0: any.
+    facets : tuple of tuples of int
+        Corner nodes of each facet, in positive order seen from outside. That of a simplex which is opposite its node i
+        has the number i; those of others are in VTK's order.
+    simplices : tuple of tuples of int
+        The corner simplices: each a node and its neighbours in the element, in the order that makes all determinants
+        positive in a valid element.
+    weight : float
+        Turns the determinant of the unit edges at a corner of the regular element into 1: scaled Jacobians.
+    """
+
+    name: str
+    plural: str
+    dimension: int
+    corners: int
+    facets: Rows = ()
+    simplices: Rows = ()
+    weight: float = 1.0
+
+    @property
+    def facet(self) -> str:
+        """What a facet is called where elements share it."""
+        return {1: "vertex", 2: "edge", 3: "triangle" if self.name == "tetrahedron" else "face"}[self.dimension]
+
+    @property
+    def measure(self) -> str:
+        """What its size is called."""
+        return MEASURES[self.dimension]
+
+    @property
+    def angle(self) -> str:
+        """What the angles between its facets are called."""
+        return "dihedral angle" if self.dimension == 3 else "angle"
+
+
+@dataclass(frozen=True)
+class Element:
+    """A type of element.
+
+    Attributes
+    ----------
+    key : str
+        By which a file's cells are named: meshio's name, or ours where it has none.
+    shape : Shape
+    nodes : int
+        0: any.
+    vtk, gmsh : int or None
+        The numbers by which these know it.
+    judged_by : str or None
+        What decides whether it is valid; None: it is held, and not judged.
+    """
+
+    key: str
+    shape: Shape
+    nodes: int
+    vtk: int | None = None
+    gmsh: int | None = None
+    judged_by: str | None = None
+
+    @property
+    def linear(self) -> bool:
+        """Whether its nodes are its corners."""
+        return self.nodes == self.shape.corners
+
+
+_VERTEX = Shape("vertex", "vertices", 0, 1)
+_LINE = Shape("line", "lines", 1, 2, ((1,), (0,)), ((0, 1),))
+_TRIANGLE = Shape(
+    "triangle", "triangles", 2, 3, ((1, 2), (2, 0), (0, 1)), ((0, 1, 2),), 2 / math.sqrt(3)
+)  # fmt: skip
+_QUAD = Shape(
+    "quadrilateral", "quadrilaterals", 2, 4, ((0, 1), (1, 2), (2, 3), (3, 0)),
+    ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
+)  # fmt: skip
+_TETRA = Shape(
+    "tetrahedron", "tetrahedra", 3, 4, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)), ((0, 1, 2, 3),), math.sqrt(2)
+)  # fmt: skip
+_PYRAMID = Shape(
+    "pyramid", "pyramids", 3, 5, ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)), math.sqrt(2),
+)  # fmt: skip
+_WEDGE = Shape(
+    "wedge", "wedges", 3, 6, ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
+    ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)), 2 / math.sqrt(3),
+)  # fmt: skip
+_HEXAHEDRON = Shape(
+    "hexahedron", "hexahedra", 3, 8,
+    ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7)),
+    (
+        (0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
+        (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
+    ),
+)  # fmt: skip
+_POLYGON = Shape("polygon", "polygons", 2, 0)
+_POLYHEDRON = Shape("polyhedron", "polyhedra", 3, 0)
+_TABLE = (
+    Element("vertex", _VERTEX, 1, vtk=1, gmsh=15),
+    Element("line", _LINE, 2, vtk=3, gmsh=1),
+    Element("line3", _LINE, 3, vtk=21, gmsh=8),
+    Element("line4", _LINE, 4, vtk=35, gmsh=26),
+    Element("triangle", _TRIANGLE, 3, vtk=5, gmsh=2, judged_by="determinant"),
+    Element("triangle6", _TRIANGLE, 6, vtk=22, gmsh=9),
+    Element("triangle7", _TRIANGLE, 7, vtk=34),
+    Element("quad", _QUAD, 4, vtk=9, gmsh=3),
+    Element("quad6", _QUAD, 6, vtk=30),
+    Element("quad8", _QUAD, 8, vtk=23, gmsh=16),
+    Element("quad9", _QUAD, 9, vtk=28, gmsh=10),
+    Element("tetra", _TETRA, 4, vtk=10, gmsh=4, judged_by="determinant"),
+    Element("tetra10", _TETRA, 10, vtk=24, gmsh=11),
+    Element("pyramid", _PYRAMID, 5, vtk=14, gmsh=7),
+    Element("pyramid13", _PYRAMID, 13, vtk=27, gmsh=19),
+    Element("pyramid14", _PYRAMID, 14, gmsh=14),
+    Element("pyramid19", _PYRAMID, 19, vtk=37),
+    Element("wedge", _WEDGE, 6, vtk=13, gmsh=6),
+    Element("wedge12", _WEDGE, 12, vtk=31),
+    Element("wedge15", _WEDGE, 15, vtk=26, gmsh=18),
+    Element("wedge18", _WEDGE, 18, vtk=32, gmsh=13),
+    Element("hexahedron", _HEXAHEDRON, 8, vtk=12, gmsh=5),
+    Element("hexahedron20", _HEXAHEDRON, 20, vtk=25, gmsh=17),
+    Element("hexahedron24", _HEXAHEDRON, 24, vtk=33),
+    Element("hexahedron27", _HEXAHEDRON, 27, vtk=29, gmsh=12),
+    Element("triangle_strip", _POLYGON, 0, vtk=6),
+    Element("polygon", _POLYGON, 0, vtk=7),
+    Element("pixel", _QUAD, 4, vtk=8),
+    Element("voxel", _HEXAHEDRON, 8, vtk=11),
+    Element("polyhedron", _POLYHEDRON, 0, vtk=42),
+)
+ELEMENTS = {element.key: element for element in _TABLE}
+
+# What is solved for, by its dimension.
+SIMPLICES = {element.shape.dimension: element for element in _TABLE if element.judged_by == "determinant"}
+
+# Types that are not in the table have a shape by their names: tetra35, VTK_LAGRANGE_WEDGE, penta_prism, ...
+_FAMILY = re.compile(
+    r"(?:VTK_[A-Z]+_)?(?P<solid>tetra|hexa|wedge|pyramid|penta|voxel|polyhedron)?(?P<flat>triangle|quad|polygon|pixel)?",
+    re.IGNORECASE,
+)
+
+
+def dimension_of(key: str) -> int:
+    """Return the dimension of a type, by its name where it is not in the table; 0 where that tells nothing."""
+    if key in ELEMENTS:
+        return ELEMENTS[key].shape.dimension
+    family = _FAMILY.match(key)
+    return 0 if family is None else 3 if family["solid"] else 2 if family["flat"] else 0
+
+
+def solved_among(keys: Iterable[str]) -> Element | None:
+    """Return the type that is solved for of those in a mesh, that of the highest dimension; None: there is none."""
+    found = set(keys)
+    present = [element for element in SIMPLICES.values() if element.key in found]
+    return max(present, key=lambda element: element.shape.dimension, default=None)

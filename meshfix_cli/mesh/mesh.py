@@ -1,0 +1,149 @@
+"""A mesh as a value: points, their topology, and which of them may move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh.topology import Topology, build_topology, read_only
+
+_T = TypeVar("_T", bound=np.generic)
+
+# Squares and sixth powers of lengths must neither overflow nor vanish in double precision.
+LARGEST_COORDINATE = 1e45
+SMALLEST_SIZE = 1e-45
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Points and their topology; immutable, a moved mesh is a new one.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+        Positions in model units, read-only.
+    topology : Topology
+    movable : (n,) bool
+        The free vertices.
+    """
+
+    points: NDArray[np.float64]
+    topology: Topology
+    movable: NDArray[np.bool_]
+
+    @classmethod
+    def build(cls, points: ArrayLike, simplices: ArrayLike, fixed: ArrayLike | None = None, threads: int = 1) -> Mesh:
+        """Check the arrays, orient the simplices and fix the boundary.
+
+        Parameters
+        ----------
+        points : (n, d) float
+            d = 2 for triangles, 3 for tetrahedra.
+        simplices : (m, d+1) int
+            Numbered either way round; see `Topology.flipped`.
+        fixed : (n,) bool, optional
+            Vertices that must not move, beside those of the boundary.
+        threads : int
+
+        Raises
+        ------
+        InvalidMeshError
+            Wrong shapes, no simplices, indices out of range, coordinates that are not finite or too large,
+            a simplex that names a vertex twice, a facet of more than two simplices, a Moebius band.
+        """
+        p = np.array(points, dtype=np.float64, order="C")
+        rows = _checked_simplices(p, np.asarray(simplices), threads)
+        used = kernels.used_vertices(rows, len(p))
+        _check_coordinates(p, used)
+        topology = build_topology(p, rows, used, threads)
+        movable = topology.used & ~topology.boundary
+        if fixed is not None:
+            movable &= ~np.asarray(fixed, dtype=bool)
+        return cls(read_only(p), topology, read_only(movable))
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.points.shape[1]
+
+    def with_points(self, points: NDArray[np.float64]) -> Mesh:
+        """Return the same mesh with other positions (n, d) float64; the array becomes read-only."""
+        if points.shape != self.points.shape or points.dtype != np.float64:
+            raise ValueError(f"points have the shape {points.shape}, and this mesh {self.points.shape}")
+        return replace(self, points=read_only(np.ascontiguousarray(points)))
+
+    def with_vertices(self, positions: NDArray[np.float64]) -> Mesh:
+        """Return the same mesh with other positions (k, d) of the connectivity's vertices."""
+        points = self.topology.of_vertices(positions)
+        if len(positions) < len(points):  # isolated ones stay
+            points = np.where(self.topology.used[:, None], points, self.points)
+        return self.with_points(points)
+
+    def with_fixed(self, fixed: NDArray[np.bool_]) -> Mesh:
+        """Return the same mesh with more vertices fixed, `fixed` (n,) bool."""
+        return replace(self, movable=read_only(self.movable & ~fixed))
+
+    def along_curve(self, values: NDArray[_T]) -> NDArray[_T]:
+        """Return values (n, ...) of the points as those (k, ...) of the connectivity's vertices."""
+        return np.take(values, self.topology.connectivity.vertices, axis=0)
+
+    def check(self, threads: int = 1) -> tuple[int, float]:
+        """Return the number of inverted simplices and the smallest signed area or volume, in model units."""
+        points, simplices = self.along_curve(self.points), self.topology.connectivity.simplices
+        inverted, smallest = kernels.check(points, simplices, threads)
+        return len(inverted), smallest
+
+    def stuck(self, threads: int = 1) -> NDArray[np.int32]:
+        """Return the rows of the connectivity's simplices that have no free vertex."""
+        return self.topology.connectivity.stuck(self.along_curve(self.movable), threads)
+
+    def mean_edge_length(self, threads: int = 1) -> float:
+        """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
+        stars, points = self.topology.stars(threads), self.along_curve(self.points)
+        start = np.repeat(np.arange(len(points), dtype=np.int32), np.diff(stars.neighbour_offsets))
+        once = start < stars.neighbours
+        edges = points[stars.neighbours[once]] - points[start[once]]
+        return float(np.linalg.norm(edges, axis=1).mean())
+
+
+def _checked_simplices(
+    points: NDArray[np.float64], simplices: NDArray[np.integer[Any]], threads: int
+) -> NDArray[np.int32]:
+    """Check shapes and indices; return the simplices as (m, d+1) int32."""
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise InvalidMeshError(f"points have the shape {points.shape}; (n, 2) or (n, 3) is needed")
+    n, d = points.shape
+    if simplices.ndim != 2 or simplices.shape[1] != d + 1 or simplices.dtype.kind not in "iu":
+        raise InvalidMeshError(f"simplices have the shape {simplices.shape}; (m, {d + 1}) integers are needed")
+    if len(simplices) == 0:
+        raise InvalidMeshError("the mesh has no elements")
+    if simplices.size >= 2**31 or n >= 2**31:
+        raise InvalidMeshError("the mesh is too large: 536 million tetrahedra are the limit")
+    # What does not fit in 32 bits is outside as well.
+    small = simplices if simplices.dtype.itemsize <= 4 else np.clip(simplices, -1, n)
+    rows = np.ascontiguousarray(small, dtype=np.int32)
+    outside, repeated = kernels.check_simplices(rows, n, threads)
+    if outside >= 0:
+        named = simplices[outside].tolist()
+        raise InvalidMeshError(f"element {outside} refers to vertices {named}, but there are {n} points")
+    if repeated >= 0:
+        raise InvalidMeshError(f"element {repeated} names a vertex twice: {simplices[repeated].tolist()}")
+    return rows
+
+
+def _check_coordinates(points: NDArray[np.float64], used: NDArray[np.int32]) -> None:
+    corners = np.take(points, used, axis=0)
+    finite = np.isfinite(corners)
+    if not finite.all():
+        vertex = int(used[np.argmin(finite.all(axis=1))])
+        raise InvalidMeshError(f"vertex {vertex} has a coordinate that is not finite")
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if max(-low.min(), high.max()) > LARGEST_COORDINATE:
+        raise InvalidMeshError(f"coordinates beyond {LARGEST_COORDINATE:g} cannot be computed with")
+    if (high - low).max() < SMALLEST_SIZE:
+        raise InvalidMeshError("all vertices are in one point")

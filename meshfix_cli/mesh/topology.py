@@ -1,0 +1,205 @@
+"""Connectivity: what does not move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh.elements import SIMPLICES, Element
+
+_T = TypeVar("_T", bound=np.generic)
+
+
+@dataclass(frozen=True, eq=False)
+class Topology:
+    """Connectivity, computed once and shared by every position of the points.
+
+    Attributes
+    ----------
+    n : int
+        Number of points.
+    source : (m,) int64
+        The row of the user's array behind each simplex (repeated simplices are left out).
+    flipped : (m,) bool
+        True where the user's numbering has the other orientation.
+    connectivity : kernels.Connectivity
+        The same in the order in which the kernels work, which is near in memory where it is near in space:
+        `vertices` (k,) and `rows` (m,) are the numbers that its vertices and simplices have here.
+    """
+
+    n: int
+    source: NDArray[np.int64]
+    flipped: NDArray[np.bool_]
+    connectivity: kernels.Connectivity
+
+    @property
+    def m(self) -> int:
+        """Number of simplices."""
+        return len(self.source)
+
+    @property
+    def dimension(self) -> int:
+        """2 for triangles, 3 for tetrahedra."""
+        return self.connectivity.simplices.shape[1] - 1
+
+    @property
+    def element(self) -> Element:
+        """The type of the simplices."""
+        return SIMPLICES[self.dimension]
+
+    def stars(self, threads: int = 1) -> kernels.Connectivity:
+        """Return the connectivity with neighbours, faces and colours of blocks, made when they are first needed."""
+        try:
+            self.connectivity.build_stars(threads)
+        except ValueError as error:  # a star, or the mesh, is too large to be numbered
+            raise InvalidMeshError(str(error)) from error
+        return self.connectivity
+
+    @cached_property
+    def colours(self) -> list[NDArray[np.int32]]:
+        """The blocks of each colour; no two blocks of one colour share an edge."""
+        stars = self.stars()
+        return np.split(stars.colour_blocks, stars.colour_offsets[1:-1])
+
+    @cached_property
+    def simplices(self) -> NDArray[np.int32]:
+        """(m, d+1) int32: the vertices of each simplex, positively oriented."""
+        mesh = self.connectivity
+        return read_only(self.of_rows(mesh.vertices[mesh.simplices]))
+
+    @cached_property
+    def component(self) -> NDArray[np.int32]:
+        """(m,) int32: simplices joined through facets have the same number."""
+        return read_only(self.of_rows(self.connectivity.component))
+
+    @cached_property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) bool: the vertices of simplices; other points are isolated."""
+        mask = np.zeros(self.n, dtype=bool)
+        mask[self.connectivity.vertices] = True
+        return mask
+
+    @cached_property
+    def number(self) -> NDArray[np.int32]:
+        """(n,) int32: the number of each vertex in the connectivity; 0 for isolated points."""
+        numbers = np.zeros(self.n, dtype=np.int32)
+        numbers[self.connectivity.vertices] = np.arange(len(self.connectivity.vertices), dtype=np.int32)
+        return numbers
+
+    @cached_property
+    def boundary(self) -> NDArray[np.bool_]:
+        """(n,) bool: vertices of facets that belong to one simplex."""
+        return self._mark_facets(self.connectivity.mates < 0)
+
+    @cached_property
+    def mirrored(self) -> NDArray[np.bool_]:
+        """(m,) bool: simplices of components whose numbering has, for most, the other orientation.
+
+        Components without an inner vertex have that of the whole mesh.
+        """
+        if not self.flipped.any():
+            return np.zeros(len(self.flipped), dtype=bool)
+        votes = np.bincount(self.component, weights=self.flipped * 2.0 - 1.0)
+        inner = (self.used & ~self.boundary)[self.simplices].any(axis=1)
+        # Without an inner vertex a part is its boundary: that may be tangled as well as mirrored, so all parts vote.
+        by_itself = np.bincount(self.component, weights=inner) > 0
+        return np.where(by_itself, votes > 0, votes.sum() > 0)[self.component]
+
+    @cached_property
+    def misnumbered(self) -> NDArray[np.bool_]:
+        """(m,) bool: simplices numbered against most of their component: inverted for whoever reads the file."""
+        return self.flipped != self.mirrored
+
+    def interface(self, regions: ArrayLike) -> NDArray[np.bool_]:
+        """(n,) bool: vertices of facets between simplices of different regions; `regions` (m,) labels."""
+        mesh = self.connectivity
+        labels = np.asarray(regions)[mesh.rows]
+        across = labels[mesh.mates // (self.dimension + 1)]
+        return self._mark_facets((mesh.mates >= 0) & (across != labels[:, None]))
+
+    def grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
+        """(n,) bool: these vertices and `rings` rings of neighbours around them."""
+        return vertices | self.of_vertices(
+            self.connectivity.grown(vertices[self.connectivity.vertices], rings).view(bool)
+        )
+
+    def of_vertices(self, values: NDArray[_T]) -> NDArray[_T]:
+        """Return values (k, ...) of the connectivity's vertices as those of all points (n, ...); 0: isolated."""
+        result = np.take(values, self.number, axis=0)
+        if len(values) < self.n:
+            result[~self.used] = 0
+        return result
+
+    def of_rows(self, values: NDArray[_T]) -> NDArray[_T]:
+        """Return values (m, ...) of the connectivity's simplices in the order of the simplices."""
+        result = np.empty_like(values)
+        result[self.connectivity.rows] = values
+        return result
+
+    def _mark_facets(self, facets: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        mesh, corners = self.connectivity, self.dimension + 1
+        mask = np.zeros(len(mesh.vertices), dtype=bool)
+        for position in range(corners):
+            rows = np.flatnonzero(facets[:, position])
+            for other in range(corners):
+                if other != position:
+                    mask[mesh.simplices[rows, other]] = True
+        return self.of_vertices(mask)
+
+
+def read_only(array: NDArray[_T]) -> NDArray[_T]:
+    """Return the array, which cannot be written to any more."""
+    array.flags.writeable = False
+    return array
+
+
+def build_topology(
+    points: NDArray[np.float64], simplices: NDArray[np.int32], used: NDArray[np.int32], threads: int
+) -> Topology:
+    """Orient simplices, leave out repetitions and find what is joined.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+    simplices : (m, d+1) int32
+        Checked: numbers of points, none twice in a simplex.
+    used : (k,) int32
+        The vertices of simplices, ascending.
+    threads : int
+
+    Raises
+    ------
+    InvalidMeshError
+        A facet of more than two simplices, a Moebius band.
+    """
+    n, d = points.shape
+    shape = SIMPLICES[d].shape
+    source = np.arange(len(simplices))
+    mesh = kernels.Connectivity(points, simplices, used, threads)
+    if mesh.crowded >= 0:
+        _, first = np.unique(np.sort(simplices, axis=1), axis=0, return_index=True)
+        source = np.sort(first)
+        mesh = kernels.Connectivity(points, np.ascontiguousarray(simplices[source]), used, threads)
+    if mesh.crowded >= 0:
+        row, position = divmod(mesh.crowded, d + 1)
+        facet = np.delete(mesh.vertices[mesh.simplices[row]], position).tolist()
+        raise InvalidMeshError(f"more than two {shape.plural} share the {shape.facet} {facet}: they overlap")
+    if not mesh.orientable:
+        raise InvalidMeshError(f"the {shape.plural} form a Moebius band: no numbering makes all of them positive")
+    flipped = mesh.against.astype(bool)
+    # The signed size of a consistently numbered component depends on its boundary alone, so it tells a mesh that
+    # is numbered the other way round from one whose interior is tangled.
+    measure = kernels.measure(np.take(points, mesh.vertices, axis=0), mesh.simplices, threads)[0]
+    np.negative(measure, out=measure, where=flipped)
+    flipped ^= (np.bincount(mesh.component, weights=measure) < 0)[mesh.component]
+    if flipped.any():
+        mesh.flip(flipped, threads)
+    rows = np.empty_like(flipped)
+    rows[mesh.rows] = flipped
+    return Topology(n, source, rows, mesh)

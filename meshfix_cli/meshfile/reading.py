@@ -1,0 +1,172 @@
+"""From a path or a stream to a document."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import MeshfixError, ReadError, naming
+from meshfix_cli.kernels import use_threads
+from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile.document import Document, build, counted, with_reversed
+from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.pieces import join
+from meshfix_cli.meshfile.source import Family, Source
+
+
+def read(
+    path: str | os.PathLike[str],
+    fix: str | None = None,
+    regions: str | None = None,
+    *,
+    double: bool = False,
+    fix_orientation: bool = False,
+    threads: int = 1,
+) -> Document:
+    """Read a triangle or tetrahedral mesh.
+
+    Parameters
+    ----------
+    path : str or path
+        "-" reads stdin; one that has a `*`, and is no file, reads the parts of a mesh whose names fit.
+    fix : str, optional
+        Name of a point-data array; vertices where it is not zero are held.
+    regions : str, optional
+        Name of a cell-data array; the interface between regions is held. Default: those of `Source.regions`.
+    double : bool
+        Make coordinates in float32 those of a file in float64.
+    fix_orientation : bool
+        Renumber the simplices that have the negative orientation, by exchanging two of their vertices.
+    threads : int
+
+    Raises
+    ------
+    ReadError
+        The file cannot be read, holds no mesh of simplices, or not the arrays named.
+    InvalidMeshError
+        See `Mesh.build`.
+    """
+    use_threads(threads)
+    streamed = os.fspath(path) == "-"
+    name = "<stdin>" if streamed else os.fspath(path)
+    with naming(name):
+        source, form = _open(None if streamed else Path(name), double, threads)
+        document = build(name, source, form, fix, regions, threads)
+        rows = document.reversed_cells() if fix_orientation else {}
+        if rows:
+            shape = document.mesh.topology.element.shape
+            note = f"renumbered {counted(sum(map(len, rows.values())), shape.name, shape.plural)}"
+            document = build(name, _with_reversed(document.source, rows, form, threads), form, fix, regions, threads)
+            document = replace(document, notes=(*document.notes, note))
+        return document
+
+
+def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
+    """Return where the pieces of a `.pvtu` are, and where those of an output would be; none of what cannot be read."""
+    if Path(source).suffix.lower() != ".pvtu":
+        return [], []
+    from meshfix_cli.meshfile.vtk.pvtu import Index
+
+    try:
+        index = Index.of(Path(source).read_bytes(), Path(source))
+        return [str(path) for path in index.paths], index.targets(target)
+    except (OSError, MeshfixError):
+        return [], []
+
+
+def _open(path: Path | None, double: bool, threads: int) -> tuple[Source, Format]:
+    """Read what a file holds, or stdin, or several files, and in which format."""
+    if path is not None and "*" in str(path) and not path.exists():
+        from meshfix_cli.meshfile.gmsh.parts import Parts
+
+        return _open_pieces(Parts.of(str(path)), double, threads)
+    if path is not None and set("?[") & set(path.name) and not path.exists():
+        raise ReadError("there is no such file; the files of one mesh are named with a *")
+    data = _read_bytes(path)
+    form = formats.sniff(data) or formats.by_name(Path() if path is None else path)
+    if form is None:
+        raise ReadError("the format is not recognised")
+    beside = path if path is not None and path.is_file() else None  # a pipe can be read only once
+    if form.name == "pvtu":
+        from meshfix_cli.meshfile.vtk.pvtu import Index
+
+        return _open_pieces(Index.of(data, beside), double, threads)
+    source = parse(data, form, beside)
+    if double and source.points.dtype != np.float64:
+        source = _promoted(data, form)
+    return source, form
+
+
+def _open_pieces(family: Family, double: bool, threads: int) -> tuple[Source, Format]:
+    contents = []
+    for name, path in zip(family.names, family.paths, strict=True):
+        with naming(name):
+            contents.append(_read_bytes(path))
+    with _believable(family.form):
+        source = join(family, family.parse(contents), threads)
+        if double and source.points.dtype != np.float64:
+            family, contents = family.promoted(contents)
+            source = join(family, family.parse(contents), threads)
+    return source, family.form
+
+
+def _read_bytes(path: Path | None) -> bytes:
+    """Read a file, or stdin."""
+    try:
+        data = sys.stdin.buffer.read() if path is None else path.read_bytes()
+    except OSError as error:
+        raise ReadError(error.strerror or str(error)) from error
+    if not data:
+        raise ReadError("is empty")
+    return data
+
+
+def parse(data: bytes, form: Format, path: Path | None = None) -> Source:
+    """Let the format's own module read; what it does not know, meshio reads, which may look for files beside it."""
+    source = None
+    if form.reader in formats.OWN:
+        with _believable(form):
+            source = _module(form).parse(data)
+    if source is None:
+        from meshfix_cli.meshfile import through_meshio
+
+        source = through_meshio.read(data, form, path)
+    return source
+
+
+@contextmanager
+def _believable(form: Format) -> Iterator[None]:
+    try:
+        yield
+    except (OverflowError, MemoryError) as error:  # a count that no file can keep
+        raise ReadError(f"is not a readable {form.name} file: it announces more than it holds") from error
+
+
+def _module(form: Format) -> Any:
+    """Imported when a file needs it: a run reads one format."""
+    return import_module(f"meshfix_cli.meshfile.{formats.OWN[form.reader].module}")
+
+
+def _promoted(data: bytes, form: Format) -> Source:
+    """Return what the file holds with its coordinates in float64."""
+    if form.reader not in formats.OWN or not hasattr(_module(form), "promoted"):
+        raise ReadError(f"coordinates of {form.name} files cannot be double")
+    return parse(_module(form).promoted(data), form)
+
+
+def _with_reversed(source: Source, rows: dict[int, NDArray[np.int64]], form: Format, threads: int) -> Source:
+    if source.pieces is not None:
+        family = source.pieces.family
+        return join(family, family.parse(list(source.pieces.rewritten(source.points, source.points, rows))), threads)
+    if source.layout is not None:
+        return parse(source.layout.rewritten(source.points, source.points, rows), form)
+    return with_reversed(source, rows)

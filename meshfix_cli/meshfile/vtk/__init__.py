@@ -1,0 +1,1 @@
+"""Files of VTK: legacy .vtk, and .vtu and .pvtu in XML, which share their cells and arrays."""

@@ -1,0 +1,129 @@
+"""The cells of VTK, which its legacy and XML files share: their numbers, names and runs.
+
+Source: VTK, "vtkCellType.h".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.meshfile.source import REGIONS, Cells
+
+# The name and the number of vertices; 0: any.
+TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() if element.vtk is not None} | {
+    0: ("empty", 0), 2: ("poly_vertex", 0), 4: ("poly_line", 0), 15: ("penta_prism", 10), 16: ("hexa_prism", 12),
+    36: ("polygon_quadratic", 0), 41: ("polyhedron", 0), 68: ("VTK_LAGRANGE_CURVE", 0),
+    69: ("VTK_LAGRANGE_TRIANGLE", 0), 70: ("VTK_LAGRANGE_QUADRILATERAL", 0), 71: ("VTK_LAGRANGE_TETRAHEDRON", 0),
+    72: ("VTK_LAGRANGE_HEXAHEDRON", 0), 73: ("VTK_LAGRANGE_WEDGE", 0), 74: ("VTK_LAGRANGE_PYRAMID", 0),
+    75: ("VTK_BEZIER_CURVE", 0), 76: ("VTK_BEZIER_TRIANGLE", 0), 77: ("VTK_BEZIER_QUADRILATERAL", 0),
+    78: ("VTK_BEZIER_TETRAHEDRON", 0), 79: ("VTK_BEZIER_HEXAHEDRON", 0), 80: ("VTK_BEZIER_WEDGE", 0),
+    81: ("VTK_BEZIER_PYRAMID", 0),
+}  # fmt: skip
+_ORDER = {13: [0, 2, 1, 3, 5, 4]}  # the wedge of meshio, from that of VTK, and back
+GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
+_MOST_RUNS = 1000  # above, cells of a type are gathered from all over the file
+
+
+class Run(NamedTuple):
+    """Cells of one type with the same number of vertices.
+
+    Attributes
+    ----------
+    type : str
+    rows : (k,) int64
+        Which cells of the file they are.
+    vertices : (k, size) int
+        In meshio's order.
+    """
+
+    type: str
+    rows: NDArray[np.int64]
+    vertices: NDArray[np.integer[Any]]
+
+    @property
+    def cells(self) -> Cells:
+        """The run as sources hold it; its `ids` are `rows`."""
+        return Cells(self.type, self.vertices, self.rows)
+
+
+def runs(
+    types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivity: NDArray[np.integer[Any]]
+) -> list[Run]:
+    """Cut cells into runs, in the order of the file where they are not too many.
+
+    Parameters
+    ----------
+    types : (m,) int
+        Numbers of VTK.
+    offsets : (m+1,) int64
+        Cell i has the vertices `connectivity[offsets[i]:offsets[i + 1]]`.
+    connectivity : (k,) int
+
+    Raises
+    ------
+    ReadError
+        The offsets do not fit, or a cell has more or fewer vertices than its type.
+    """
+    sizes = np.diff(offsets)
+    if len(sizes) != len(types) or offsets[0] < 0 or (sizes < 0).any() or offsets[-1] > len(connectivity):
+        raise ReadError("is not a readable VTK file: the offsets of its cells do not fit their vertices")
+    found = []
+    for rows in _same(types, sizes):
+        number, size = int(types[rows[0]]), int(sizes[rows[0]])
+        name, expected = TYPES.get(number, (f"vtk{number}", 0))
+        if name == "polygon" and size == 3:
+            name = "triangle"
+        if expected not in (0, size):
+            raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {size} vertices")
+        if number not in _ORDER and rows[-1] - rows[0] == len(rows) - 1:  # they stand one behind the other
+            vertices = connectivity[offsets[rows[0]] : offsets[rows[-1] + 1]].reshape(len(rows), size)
+        else:
+            vertices = connectivity[offsets[rows][:, None] + np.array(_ORDER.get(number, range(size)), dtype=np.int64)]
+        found.append(Run(name, rows, vertices))
+    return found
+
+
+def markings(
+    names: Set[str],
+    cells: Sequence[Cells],
+    cell: Callable[[], Mapping[str, Sequence[NDArray[Any]]]],
+    damaged: str,
+) -> tuple[tuple[str, ...], list[Cells]]:
+    """Return which cell arrays tell materials apart, and the runs of cells with their ghosts marked.
+
+    Parameters
+    ----------
+    names : set of str
+        All cell arrays; `cell` reads them, if one of them matters.
+    damaged : str
+        What is said of one that matters and cannot be read: else an interface would be free to move.
+    """
+    regions, marks = tuple(name for name in REGIONS if name in names), GHOSTS & names
+    for name in (*regions, *marks):
+        if name not in cell():
+            raise ReadError(damaged.format(repr(name)))
+    if not marks:
+        return regions, list(cells)
+    ghosts = [np.any([cell()[name][i] != 0 for name in marks], axis=0) for i in range(len(cells))]
+    return regions, [replace(run, ghosts=mask) for run, mask in zip(cells, ghosts, strict=True)]
+
+
+def _same(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> Sequence[NDArray[np.int64]]:
+    """Rows of cells of one type and size, run by run."""
+    rows = np.arange(len(types))
+    starts = _changes(types, sizes)
+    if len(starts) >= _MOST_RUNS:
+        rows = np.lexsort((sizes, types))
+        starts = _changes(types[rows], sizes[rows])
+    return np.split(rows, starts) if len(rows) else []
+
+
+def _changes(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.flatnonzero((np.diff(types) != 0) | (np.diff(sizes) != 0)) + 1

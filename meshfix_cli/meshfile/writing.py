@@ -1,0 +1,224 @@
+"""From a document and moved points to a file, or to a stream."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import MeshfixError, WriteError
+from meshfix_cli.mesh.elements import SIMPLICES
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
+from meshfix_cli.meshfile.document import Document
+from meshfix_cli.meshfile.formats import PARTS, Format
+from meshfix_cli.meshfile.reading import parse
+from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
+from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing
+
+Put = Callable[[Path, Places, Points, NDArray[np.bool_]], None]
+ROUNDING = 1e-4  # relative to the size of the mesh: more than any format rounds, less than any mesh can bear
+
+
+def write(
+    document: Document,
+    mesh: Mesh,
+    target: str | os.PathLike[str],
+    form: Format | None = None,
+    backup: bool = False,
+    put: Put | None = None,
+) -> tuple[Mesh, tuple[str, ...]]:
+    """Write a moved mesh; return it as the file holds it, and what was dropped.
+
+    In the format it came in, every byte outside the coordinates that moved stays as it was, where the format's own
+    module has read it; otherwise meshio writes what both formats hold.
+
+    Parameters
+    ----------
+    document : Document
+    mesh : Mesh
+        Made of `document.mesh` by moving vertices.
+    target : str or path
+        Replaced at once or not at all; "-" writes to stdout. Of a mesh in pieces it is what was read, or its like:
+        the name of a .pvtu, or one with a `*`.
+    form : Format, optional
+        Default: see `output_format`.
+    backup : bool
+        Keep what `target` was as `target.bak`, or, where that exists, `target.bak1` and so on.
+    put : callable, optional
+        (path, places, points, where they changed): writes the coordinates into a copy of a binary file.
+
+    Raises
+    ------
+    WriteError
+        Nothing was written.
+    """
+    target = os.fspath(target)
+    form = form or output_format(document, target)
+    check_target(target)
+    check_pieces(document, target, form)
+    points, source, put = document.file_points(mesh), document.source, None if is_stream(target) else put
+    stored = document.in_plane(points.astype(np.float64), mesh)
+    layout, pieces = (source.layout, source.pieces) if form == document.format else (None, None)
+    if pieces is not None:
+        write_files(pieces.files(target, source.points, points), backup)
+        return stored, ()
+    if layout is not None:
+        write_file(target, partial(_splice, layout, source.points, points, put), backup)
+        return stored, ()
+    dropped: tuple[str, ...] = ()
+
+    def produce(temporary: Path) -> None:
+        nonlocal stored, dropped
+        try:
+            held, dropped = _write_anew(temporary, source.merged(), points, form, mesh.dimension)
+        except WriteError as error:
+            raise WriteError(f"{target}: {error}") from error
+        stored = document.in_plane(held, mesh)
+
+    write_file(target, produce, backup)
+    return stored, dropped
+
+
+def _splice(layout: Layout, original: Points, points: Points, put: Put | None, path: Path) -> None:
+    if put is None or not (isinstance(layout, InPlace) and layout.binary):
+        path.write_bytes(layout.rewritten(original, points, {}))
+        return
+    path.write_bytes(layout.data)
+    put(path, layout.coordinates, points, differing(original, points))
+
+
+def write_cells(
+    document: Document,
+    mesh: Mesh,
+    target: str,
+    cell: Mapping[str, NDArray[Any]],
+    point: Mapping[str, NDArray[Any]],
+) -> None:
+    """Write the simplices of a moved mesh with data for each, for programs that draw them.
+
+    Parameters
+    ----------
+    target : str
+        Its extension tells the format, any that holds cell data.
+    cell : mapping
+        An array (m, ...) for each name.
+    point : mapping
+        An array (n, ...) for each name.
+
+    Raises
+    ------
+    WriteError
+        Nothing was written.
+    """
+    form = check_cells(document, target)
+    arrays = Arrays(point=point, cell={name: [values] for name, values in cell.items()})
+    source = Source(
+        document.file_points(mesh), [Cells(mesh.topology.element.key, document.simplices)], load=lambda: arrays
+    )
+
+    def produce(temporary: Path) -> None:
+        _write_anew(temporary, source, source.points, form, mesh.dimension)
+
+    write_file(target, produce)
+
+
+def check_cells(document: Document, target: str) -> Format:
+    """Return the format of a file for `write_cells`; WriteError where that does not hold the data."""
+    form = output_format(document, target)
+    if form.reader not in ("vtk", "vtu"):
+        raise WriteError(f"{target}: quality can be drawn from .vtu and .vtk files, and this would be {form.name}")
+    return form
+
+
+def check_pieces(document: Document, target: str, form: Format) -> None:
+    """Raise WriteError now, before any work, where the pieces of a mesh cannot be written for this target."""
+    if document.source.pieces is not None:
+        document.source.pieces.check(target, form == document.format)
+
+
+def output_format(document: Document, target: str, name: str | None = None) -> Format:
+    """Return the format of the output: the one named, else that of the target's extension, else the input's.
+
+    A target that is the input keeps its format, and one with an extension that is not known has it. A mesh that was
+    read in parts is written so where its format stays.
+
+    Raises
+    ------
+    WriteError
+        The format cannot be written.
+    """
+    in_parts = document.format == PARTS
+    if "*" in Path(target).name and not Path(target).exists():
+        if not in_parts or name is not None:
+            raise WriteError(f"{target}: a * in OUTPUT is for a mesh in parts, which are read by a * in INPUT")
+        return document.format
+    if name is not None:
+        form = Format(name)
+    elif target == "-" or document.is_file(target):
+        form = document.format
+    else:
+        form = formats.by_name(Path(target)) or document.format
+        if in_parts and form.reader == "gmsh":
+            return document.format
+    if form.reader == document.format.reader and name is None:
+        return document.format if document.source.spliced else _writable(document.format, target)
+    if form.binary is None and form.name in formats.BOTH:
+        form = Format(form.name, bool(document.format.binary))
+    return document.format if form == document.format else _writable(form, target)
+
+
+def _writable(form: Format, target: str) -> Format:
+    if form.name == "gmsh":  # meshio leaves out entities that own no node, and gmsh does not open that
+        raise WriteError(f"{target}: files of gmsh 4.1 are written back, but not made of others; use --format gmsh22")
+    if form.name not in formats.writers():
+        raise WriteError(f"{target}: the format {form.name} cannot be written")
+    return form
+
+
+def _write_anew(
+    path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format, dimension: int
+) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    """Let meshio write, and read it again: return the points (n, d) as the file holds them, and what was dropped.
+
+    Raises
+    ------
+    WriteError
+        The format cannot hold the simplices of this dimension, or rounds them too much.
+    """
+    from meshfix_cli.meshfile import through_meshio
+
+    through_meshio.write(path, source, points, form)
+    kind = SIMPLICES[dimension].key, dimension + 1
+    expected = source.vertices_of(*kind)
+    held = points.astype(np.float64)
+    size = float(np.ptp(held[expected], axis=(0, 1)).max())
+    try:
+        back = parse(path.read_bytes(), form, path)
+        if not len(back.vertices_of(*kind)):
+            raise WriteError(f"cannot be written as {form.name}: that holds no {SIMPLICES[dimension].shape.plural}")
+        corners = _spatial(back.points)[back.vertices_of(*kind)]
+        difference = np.abs(corners - _spatial(held)[expected]).max()
+        dropped = source.lost_in(back)
+        if back.arrays.unread:
+            raise WriteError(f"cannot be written as {form.name}: it would hold {back.arrays.unread[0]}")
+    except WriteError:
+        raise
+    except (MeshfixError, IndexError, ValueError) as error:
+        raise WriteError(f"cannot be written as {form.name}: what was written does not read back") from error
+    if not difference <= ROUNDING * size:
+        raise WriteError(f"cannot be written as {form.name}: the coordinates do not read back")
+    held[expected] = corners[:, :, : held.shape[1]]
+    return held, dropped
+
+
+def _spatial(points: Any) -> NDArray[np.float64]:
+    """Points with three coordinates."""
+    p = np.asarray(points, dtype=np.float64)
+    return np.hstack([p, np.zeros((len(p), 3 - p.shape[1]))]) if p.shape[1] < 3 else p

@@ -1,0 +1,1 @@
+"""How good a mesh is, and what keeps it from being better."""

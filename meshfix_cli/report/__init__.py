@@ -1,0 +1,1 @@
+"""What is said about a mesh, on a terminal, as JSON, as a page and as pictures."""

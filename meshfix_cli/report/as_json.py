@@ -1,0 +1,84 @@
+"""Reports for programs: JSON and CSV."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from meshfix_cli import __version__
+from meshfix_cli.quality.summary import BIN_WIDTH, Summary
+from meshfix_cli.report.facts import Report, listed
+
+if TYPE_CHECKING:
+    from meshfix_cli.solve.records import SweepRecord
+
+SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
+
+
+def to_json(report: Report) -> dict[str, Any]:
+    """Return the facts of the table under stable names; angles in degrees, times in seconds, lengths of the model."""
+    mesh = report.mesh
+    return {
+        "schema": SCHEMA,
+        "command": report.command,
+        "file": report.name,
+        "dimension": mesh.dimension,
+        "elements": mesh.topology.m,
+        "vertices": int(mesh.topology.used.sum()),
+        "free_vertices": int(mesh.movable.sum()),
+        "fixed": report.fixed,
+        "valid": report.valid,
+        "misnumbered": report.misnumbered,
+        "mirrored": int(mesh.topology.mirrored.sum()),
+        "ceiling": report.ceiling,
+        "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
+        "first_inverted": [{"id": i, "centroid": c} for i, c in listed(report)],
+        "inverted_without_free_vertex": len(report.obstacles.inverted),
+        "obstacles": {
+            "inverted": report.ids[report.obstacles.inverted].tolist(),
+            "crossing": report.ids[report.obstacles.crossing].tolist(),
+        },
+        "sweeps": [asdict(record) for record in report.records],
+        "notes": list(report.notes),
+        "requirements": [
+            {"requirement": str(one), "value": _finite(one.value(report.result)), "met": one.holds(report.result)}
+            for one in report.requirements
+        ],
+        **(report.facts or {}),
+    }
+
+
+def batch_json(options: Mapping[str, Any], files: Sequence[Mapping[str, Any]], total: int) -> str:
+    """Return one JSON object about a batch of so many files, of which some are done: one line for each."""
+    head = {"schema": SCHEMA, "version": __version__, "command": "batch", "options": options, "total": total}
+    lines = ",\n".join(json.dumps(one, allow_nan=False) for one in files)
+    return f'{json.dumps(head, allow_nan=False)[:-1]}, "files": [\n{lines}\n]}}\n'
+
+
+def history_csv(records: Iterable[SweepRecord]) -> str:
+    """Return a line for each sweep: the series of the paper's figure 4.4."""
+    rows = [asdict(record) for record in records]
+    lines = [",".join(rows[0])] if rows else []
+    return "\n".join(lines + [",".join(str(value) for value in row.values()) for row in rows]) + "\n"
+
+
+def _summary_json(summary: Summary) -> dict[str, Any]:
+    values = {
+        "inverted": summary.inverted,
+        "folded": summary.folded,
+        "min_measure": summary.min_measure,
+        "min_angle": summary.min_angle,
+        "max_angle": summary.max_angle,
+        "mean_min_angle": summary.mean_min_angle,
+        "percentile_1": summary.percentile_1,
+        "histogram": {"bin_width": BIN_WIDTH, "counts": list(summary.histogram)},
+    }
+    finite = {name: [_finite(v) for v in pair] for name, pair in summary.metrics.items()}
+    return {**values, "metrics": {name: {"worst": w, "mean": m} for name, (w, m) in finite.items()}}
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity, which is the aspect ratio of an inverted element."""
+    return value if abs(value) < float("inf") else None

@@ -1,0 +1,270 @@
+"""What is reported of a run, in plain words and rows that a terminal and a page share."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality.requirement import Requirement
+from meshfix_cli.quality.summary import Summary
+
+if TYPE_CHECKING:
+    from meshfix_cli.quality.obstacles import Obstacles
+    from meshfix_cli.solve.records import SweepRecord
+
+LISTED = 10  # inverted elements named in the report
+
+# What can become of a file of a batch, and how it is told.
+STATUSES = {"valid": "valid", "invalid": "NOT VALID", "failed": "failed", "skipped": "skipped"}
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """All facts about one run, from which the table and the JSON are made.
+
+    Attributes
+    ----------
+    name, command : str
+    meshes : dict
+        By the names of the stages; the last is the result, as the file stores it.
+    points : callable
+        Gives the result (n, 2) or (n, 3) float in the coordinates of the file.
+    ids : (m,) int64
+        The file's numbers of the simplices.
+    stages : dict
+        Summaries by name in the order of the table's columns; the last is that of the result. A brief report has no
+        others.
+    ceiling : float or None
+        Degrees; the smallest angle that fixed vertices set.
+    obstacles : Obstacles
+        What makes a valid mesh impossible.
+    fixed : dict
+        Number of fixed vertices by reason.
+    records : sequence of SweepRecord
+    notes : sequence of str
+    facts : dict
+        Whatever else the command has to tell, under stable names.
+    requirements : sequence of Requirement
+        What the user asks of the result.
+    everything : bool
+        List all inverted elements, not only the first.
+    """
+
+    name: str
+    command: str
+    meshes: Mapping[str, Mesh]
+    points: Callable[[], NDArray[np.floating[Any]]]
+    ids: NDArray[np.int64]
+    stages: dict[str, Summary]
+    ceiling: float | None
+    obstacles: Obstacles
+    fixed: dict[str, int]
+    records: Sequence[SweepRecord] = ()
+    notes: Sequence[str] = ()
+    facts: Mapping[str, Any] | None = None
+    requirements: Sequence[Requirement] = ()
+    everything: bool = False
+
+    @property
+    def mesh(self) -> Mesh:
+        """The result."""
+        return list(self.meshes.values())[-1]
+
+    @property
+    def result(self) -> Summary:
+        """The summary of the result."""
+        return list(self.stages.values())[-1]
+
+    @property
+    def misnumbered(self) -> int:
+        """Elements numbered against the rest of the mesh: inverted for whoever reads the file, whatever their shape."""
+        return int(self.mesh.topology.misnumbered.sum())
+
+    @property
+    def valid(self) -> bool:
+        """No element is inverted, by shape or by numbering, and no fixed boundary crosses itself."""
+        return self.result.inverted == 0 and self.misnumbered == 0 and not self.obstacles
+
+    @property
+    def met(self) -> bool:
+        """All requirements are."""
+        return all(one.holds(self.result) for one in self.requirements)
+
+    @property
+    def listed(self) -> int | None:
+        """How many elements are listed; None: all."""
+        return None if self.everything else LISTED
+
+
+@dataclass
+class Tally:
+    """The results of a batch, see `batch.Task.result`, counted as they come.
+
+    Attributes
+    ----------
+    statuses : Counter
+    elements : int
+        Of the meshes that were read.
+    inverted : [int, int]
+        Before and after; files that were skipped count only after.
+    angle : [float, float]
+        The worst of the smallest angles, degrees.
+    """
+
+    statuses: Counter[str] = field(default_factory=Counter)
+    elements: int = 0
+    inverted: list[int] = field(default_factory=lambda: [0, 0])
+    angle: list[float] = field(default_factory=lambda: [math.inf, math.inf])
+
+    def add(self, result: Mapping[str, Any]) -> None:
+        """Count one more."""
+        self.statuses[result["status"]] += 1
+        self.elements += result.get("elements", 0)
+        for i, summary in enumerate(before_and_after(result)):
+            if summary is not None:
+                self.inverted[i] += summary["inverted"]
+                self.angle[i] = min(self.angle[i], summary["min_angle"])
+
+
+def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """Return the first and the last summary of a result; what is not known is None."""
+    stages: dict[str, dict[str, Any]] = result.get("quality", {})
+    return stages.get("before"), next(reversed(stages.values()), None)
+
+
+def kept(result: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the report on a batch keeps of a result."""
+    names = ("file", "output", "status", "error", "seconds", "dimension", "elements", "vertices", "valid", "notes")
+    before, after = before_and_after(result)
+    return {**{name: result.get(name) for name in names}, "before": before, "after": after}
+
+
+def title(report: Report) -> str:
+    """Return what the mesh is, in one line."""
+    mesh = report.mesh
+    cells, held = mesh.topology.element.shape.plural, ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
+    vertices, free = int(mesh.topology.used.sum()), int(mesh.movable.sum())
+    return f"{report.name}: {mesh.topology.m:,} {cells}, {vertices:,} vertices: {free:,} free" + (
+        f", fixed {held}" if held else ""
+    )
+
+
+def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
+    """Return the rows of the quality table: a label, and the value of each stage."""
+    flat, stages = report.mesh.dimension == 2, list(report.stages.values())
+    shape = report.mesh.topology.element.shape
+    angle = shape.angle
+
+    def row(label: str, form: str, field: str) -> tuple[str, list[str]]:
+        return label, [format(getattr(summary, field), form) for summary in stages]
+
+    rows = [
+        row("inverted elements", ",", "inverted"),
+        row("folded interior edges" if flat else "folded interior faces", ",", "folded"),
+        row(f"smallest {shape.measure}", ".3g", "min_measure"),
+        row(f"smallest {angle} [°]", ".3f", "min_angle"),
+        row(f"largest {angle} [°]", ".3f", "max_angle"),
+        row(f"mean smallest {angle} [°]", ".2f", "mean_min_angle"),
+        row("1st percentile [°]", ".2f", "percentile_1"),
+    ]
+    if report.ceiling is not None:
+        rows.append(("ceiling set by fixed vertices [°]", [""] * (len(stages) - 1) + [f"{report.ceiling:.3f}"]))
+    for name in report.result.metrics:
+        worst = [f"{summary.metrics[name][0]:.3g} / {summary.metrics[name][1]:.3g}" for summary in stages]
+        rows.append((f"{name}, worst / mean", worst))
+    return rows
+
+
+def phases(report: Report) -> Iterator[str]:
+    """Give a line for each phase: its sweeps, what is left after the last, and seconds."""
+    by_name: dict[str, list[SweepRecord]] = {}
+    for record in report.records:
+        if record.sweep and record.phase != "best":
+            by_name.setdefault(record.phase, []).append(record)
+    for name, records in by_name.items():
+        left, sweeps, seconds = records[-1], len(records), sum(record.seconds for record in records)
+        measure = f"smallest {report.mesh.topology.element.shape.measure} {left.min_measure:.3g}"
+        yield f"{name}: {sweeps} sweep{'s' * (sweeps > 1)}, {left.inverted:,} inverted, {measure}, {seconds:.3g} s"
+
+
+def processes(report: Report) -> Iterator[str]:
+    """Say of each of several processes what it held and sent."""
+    for facts in (report.facts or {}).get("ranks", ()):
+        memory = "" if facts["peak_mb"] is None else f", {facts['peak_mb']:,.0f} MB at most"
+        held = f"{facts['vertices']:,} vertices and {facts['ghosts']:,} ghosts"
+        yield f"{held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
+
+
+def verdict(report: Report, listing: bool = True) -> list[str]:
+    """Return in plain words how far vertices moved, and whether the mesh is valid; if not, why.
+
+    With `listing`, a line for each inverted element that is listed follows.
+    """
+    facts = report.facts or {}
+    lines = [_perturbed(facts)] if "moved" in facts else [_displaced(facts)] if "displacement" in facts else []
+    count = report.result.inverted
+    if report.valid:
+        return [*lines, "valid: no element is inverted"]
+    if count:
+        verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
+        text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
+        if listing:
+            text += f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"
+        lines.append(text)
+    if count and listing:
+        lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in listed(report)]
+    lines += _impossible(report)
+    if report.misnumbered:
+        first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[: report.listed]].tolist()
+        some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > len(first) else "")
+        what = "element is" if report.misnumbered == 1 else "elements are"
+        text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (element {some})"
+        lines.append(f"{text}; untangle --fix-orientation renumbers them")
+    return lines
+
+
+def _impossible(report: Report) -> Iterator[str]:
+    """Name what no motion of the free vertices can mend."""
+    stuck, crossing = report.ids[report.obstacles.inverted], report.ids[report.obstacles.crossing]
+    some = slice(report.listed)
+    if len(stuck):
+        more = ", ..." if len(stuck[some]) < len(stuck) else ""
+        which = f"element{'s' * (len(stuck) > 1)} {', '.join(map(str, stuck[some].tolist()))}{more}"
+        yield f"IMPOSSIBLE: {len(stuck):,} of them without a free vertex: the fixed ones are wrong ({which})"
+    if len(crossing):
+        more = ", ..." if len(crossing[some]) < len(crossing) else ""
+        which = ", ".join(f"{a} and {b}" for a, b in crossing[some].tolist())
+        what = "place" if len(crossing) == 1 else "places"
+        yield f"IMPOSSIBLE: the fixed boundary crosses itself in {len(crossing):,} {what} (elements {which}{more})"
+
+
+def required(report: Report) -> Iterator[tuple[bool, str]]:
+    """Yield for each requirement whether it is met, and the same in words."""
+    for one in report.requirements:
+        met = one.holds(report.result)
+        yield met, f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g})"
+
+
+def _displaced(facts: Mapping[str, Any]) -> str:
+    far = facts["displacement"]
+    return f"moved {far['vertices']:,} vertices by {far['mean']:.3g} in the mean and {far['largest']:.3g} at most"
+
+
+def _perturbed(facts: Mapping[str, Any]) -> str:
+    return f"moved {facts['moved']:,} vertices by {facts['distance']:.6g} (seed {facts['seed']})"
+
+
+def listed(report: Report) -> list[tuple[int, list[float]]]:
+    """Return the number of each inverted element that is listed, and its centroid in the coordinates of the file."""
+    first = report.result.inverted_elements[: report.listed]
+    if not len(first):
+        return []
+    centroids = report.points()[report.mesh.topology.simplices[first]].mean(axis=1, dtype=np.float64)
+    return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]

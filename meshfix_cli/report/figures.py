@@ -1,0 +1,282 @@
+"""What pages and plots show of a report, found out once: the mesh as pictures, the worst elements, the convergence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality.summary import Summary, worst_first
+from meshfix_cli.report.facts import Report
+from meshfix_cli.solve.records import SweepRecord
+from meshfix_cli.solve.strategies import SMOOTHING
+
+WORST = 10  # elements of the result that are named and marked
+MOST_CELLS = 100_000  # triangles of a plane mesh that are all drawn
+MOST_INVERTED = 20_000  # inverted elements that are drawn of each stage
+MOST_FACETS = 150_000  # of the boundary; above it is drawn on a grid, which has so many cells along its longest side:
+GRID = 512
+THINNEST = 1e-3  # extent of a picture, relative to the largest
+CREASE = 30.0  # degrees between two facets of the boundary, above which their edge is drawn
+
+Points = NDArray[np.float64]
+Rows = NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The elements that are drawn of one stage.
+
+    Attributes
+    ----------
+    points : (k, d) float64
+        In model units, as the solver has them.
+    cells, inverted, worst : (m, d+1) int32
+        Rows of `points`: all elements where they can all be drawn, those inverted, the worst (of the result alone).
+    left_out : int
+        Inverted elements that are not drawn.
+    """
+
+    points: Points
+    cells: Rows
+    inverted: Rows
+    worst: Rows
+    left_out: int
+
+    @property
+    def count(self) -> int:
+        """How many elements are inverted."""
+        return len(self.inverted) + self.left_out
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """The picture of a mesh in all stages.
+
+    Attributes
+    ----------
+    boundary : (k, d) float64
+        Vertices of the boundary, which no stage moves.
+    facets : (f, d) int32
+        Its facets, oriented, as rows of `boundary`.
+    creases : (e, 2) int32
+        Edges of a boundary in space at which it has a corner; none where it is coarse.
+    coarse : bool
+        The boundary has so many facets that it is drawn on a grid.
+    states : dict
+        By the name of the stage.
+    """
+
+    boundary: Points
+    facets: Rows
+    creases: Rows
+    coarse: bool
+    states: dict[str, State]
+
+    @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.boundary.shape[1]
+
+    @property
+    def frame(self) -> tuple[Points, Points]:
+        """The middle (d,) of the mesh and half its extent (d,), never 0, which is what pictures show at first."""
+        points = self.boundary if len(self.boundary) else next(iter(self.states.values())).points
+        low, high = points.min(axis=0), points.max(axis=0)
+        half = (high - low) / 2
+        return low + half, np.maximum(half, THINNEST * (half.max() or 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Worst:
+    """One of the worst elements of the result.
+
+    Attributes
+    ----------
+    id : int
+        The file's number.
+    angle : float
+        The smallest, in degrees.
+    measure : float
+        Signed area or volume, in model units.
+    inverted : bool
+    centroid : (2,) or (3,) float64
+        In the coordinates of the file.
+    corners : (d+1, d) float64
+        As in `State.points`.
+    """
+
+    id: int
+    angle: float
+    measure: float
+    inverted: bool
+    centroid: Points
+    corners: Points
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """The series of the paper's figure 4.4: inverted elements and smallest measures after so many sweeps.
+
+    `smoothing` is the number of sweeps after which smoothing begins; None: there was none.
+    """
+
+    inverted: tuple[int, ...]
+    measures: tuple[float, ...]
+    smoothing: int | None
+
+
+@dataclass(frozen=True, eq=False)
+class Figures:
+    """All that is drawn of a report.
+
+    Attributes
+    ----------
+    histograms : dict
+        Counts of smallest angles, in bins of `quality.BIN_WIDTH` degrees, of the first stage and of the last.
+    convergence : Convergence or None
+        None: there were no sweeps.
+    worst : list of Worst
+    scene : Scene
+    """
+
+    histograms: dict[str, tuple[int, ...]]
+    convergence: Convergence | None
+    worst: list[Worst]
+    scene: Scene
+
+
+def figures(report: Report, threads: int = 1) -> Figures:
+    """Find out what is to be drawn of a report that has all stages."""
+    stages = list(report.stages)
+    inverted = {name: _inverted(report.meshes[name], summary) for name, summary in report.stages.items()}
+    rows = worst_first(report.mesh, inverted[stages[-1]], WORST, threads)
+    return Figures(
+        histograms={stage: report.stages[stage].histogram for stage in dict.fromkeys((stages[0], stages[-1]))},
+        convergence=convergence(report.records) if report.records else None,
+        worst=_worst(report, rows, inverted[stages[-1]]),
+        scene=scene(report.meshes, inverted, rows),
+    )
+
+
+def _inverted(mesh: Mesh, summary: Summary) -> Rows:
+    """Return the rows that are inverted by shape or, for whoever reads the file, by their numbering."""
+    return np.union1d(summary.inverted_elements, np.flatnonzero(mesh.topology.misnumbered)).astype(np.int32)
+
+
+def convergence(records: Sequence[SweepRecord]) -> Convergence:
+    """Return the series of the records."""
+    smoothing = (i for i, record in enumerate(records) if record.phase.startswith(SMOOTHING))
+    first = next(smoothing, None)
+    return Convergence(
+        inverted=tuple(record.inverted for record in records),
+        measures=tuple(record.min_measure for record in records),
+        smoothing=None if first is None else first - 1,
+    )
+
+
+def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArray[np.int64]) -> Scene:
+    """Return the picture of the stages of a mesh; `inverted` and `worst` are rows of its simplices."""
+    result, mesh = list(meshes.items())[-1]
+    boundary, facets, coarse = _coarser(*_boundary(mesh))
+    whole = mesh.dimension == 2 and mesh.topology.m <= MOST_CELLS
+    drawn = partial(_whole_state, mesh.topology.number[mesh.topology.simplices]) if whole else _partial_state
+    return Scene(
+        boundary=boundary,
+        facets=facets,
+        creases=np.empty((0, 2), dtype=np.int32) if coarse or mesh.dimension == 2 else _creases(boundary, facets),
+        coarse=coarse,
+        states={
+            name: drawn(mesh, inverted[name], worst if name == result else worst[:0]) for name, mesh in meshes.items()
+        },
+    )
+
+
+def _worst(report: Report, rows: NDArray[np.int64], inverted_rows: Rows) -> list[Worst]:
+    simplices, inverted = report.mesh.topology.simplices[rows], np.isin(rows, inverted_rows)
+    measures, _ = kernels.measure(report.mesh.points, simplices, 1)
+    angles = np.degrees(kernels.angles(report.mesh.points, simplices, 1)[0])
+    centroids = report.points()[simplices].mean(axis=1, dtype=np.float64)
+    return [
+        Worst(
+            id=int(report.ids[row]),
+            angle=float(angles[i]),
+            measure=float(measures[i]),
+            inverted=bool(inverted[i]),
+            centroid=centroids[i],
+            corners=report.mesh.points[simplices[i]],
+        )
+        for i, row in enumerate(rows.tolist())
+    ]
+
+
+def _whole_state(cells: Rows, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
+    return State(mesh.along_curve(mesh.points), cells, cells[inverted], cells[worst], left_out=0)
+
+
+def _partial_state(mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
+    # Spread, so that what is left out is left out everywhere.
+    some = inverted[np.linspace(0, len(inverted) - 1, min(len(inverted), MOST_INVERTED)).astype(np.int64)]
+    points, cells = _compact(mesh.points, mesh.topology.simplices[np.concatenate([some, worst])])
+    none = np.empty((0, mesh.dimension + 1), dtype=np.int32)
+    return State(points, none, cells[: len(some)], cells[len(some) :], left_out=len(inverted) - len(some))
+
+
+def _compact(points: Points, rows: NDArray[np.integer[Any]]) -> tuple[Points, Rows]:
+    """Return the points that rows (m, c) name, and the rows with the numbers that these have then."""
+    used, numbers = np.unique(rows, return_inverse=True)
+    return points[used], numbers.reshape(rows.shape).astype(np.int32)
+
+
+def _boundary(mesh: Mesh) -> tuple[Points, Rows]:
+    """Return the vertices (k, d) and the oriented facets (f, d) of the boundary."""
+    connectivity = mesh.topology.connectivity
+    facets = [
+        connectivity.simplices[connectivity.mates[:, position] < 0][:, corners]
+        for position, corners in enumerate(mesh.topology.element.shape.facets)
+    ]
+    return _compact(mesh.along_curve(mesh.points), np.concatenate(facets))
+
+
+def _coarser(points: Points, facets: Rows) -> tuple[Points, Rows, bool]:
+    """Join the vertices in each cell of a grid, as coarse as it takes for `MOST_FACETS`; True: it was needed."""
+    low, size, cells = points.min(axis=0), np.ptp(points, axis=0).max() or 1.0, GRID
+    merged: NDArray[np.integer[Any]] = facets
+    while len(merged) > MOST_FACETS:
+        places = np.floor((points - low) / size * cells).astype(np.int64)
+        _, first, numbers = np.unique(_keys(places, cells + 1), return_index=True, return_inverse=True)
+        joined = numbers.reshape(-1)[facets]
+        ordered = np.sort(joined, axis=1)
+        _, once = np.unique(_keys(ordered, len(first)), return_index=True)
+        merged = first[joined[once[(np.diff(ordered[once], axis=1) > 0).all(axis=1)]]]
+        cells = cells * 2 // 3
+    return (*_compact(points, merged), merged is not facets)
+
+
+def _keys(rows: NDArray[np.int64], base: int) -> NDArray[np.int64]:
+    """Return one number (m,) for each row (m, c) of numbers below `base`, which is at most two million."""
+    return rows @ base ** np.arange(rows.shape[1], dtype=np.int64)
+
+
+def _creases(points: Points, facets: Rows) -> Rows:
+    """Return the edges (e, 2) of triangles at which two of them meet at an angle, or not two meet."""
+    corners = points[facets]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.where(lengths > 0, lengths, 1)
+    edges = np.sort(facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    order = np.lexsort(edges.T)
+    edges, owner = edges[order], order // 3
+    starts = np.flatnonzero(np.r_[True, (np.diff(edges, axis=0) != 0).any(axis=1)][: len(edges)])
+    pairs = np.diff(np.r_[starts, len(edges)]) == 2
+    first = starts[pairs]
+    smooth = (normals[owner[first]] * normals[owner[first + 1]]).sum(axis=1) > np.cos(np.radians(CREASE))
+    sharp = ~pairs
+    sharp[np.flatnonzero(pairs)[~smooth]] = True
+    return np.ascontiguousarray(edges[starts[sharp]])

@@ -1,0 +1,282 @@
+"""The report as one HTML file: tables, charts, and a picture that can be turned; it needs nothing else."""
+
+from __future__ import annotations
+
+import base64
+import json
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from hashlib import sha256
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path, PurePath
+from string import Template
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.elements import SIMPLICES
+from meshfix_cli.quality.summary import BIN_WIDTH
+from meshfix_cli.report.as_json import to_json
+from meshfix_cli.report.facts import Report, phases, processes, quality_rows, required, title, verdict
+from meshfix_cli.report.figures import Figures, Scene, Worst
+from meshfix_cli.report.page import charts
+
+FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
+PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")
+
+Numbers = NDArray[np.float64]
+
+
+def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
+    """Return the HTML.
+
+    Parameters
+    ----------
+    report : Report
+        With all stages.
+    drawn : Figures
+        Of that report.
+    options : mapping
+        Those of the command line and their values.
+    """
+    skeleton, style, script = (
+        (Path(__file__).parent / name).read_text(encoding="utf-8")
+        for name in ("skeleton.html", "style.css", "viewer.js")
+    )
+    return Template(skeleton).substitute(
+        style=style,
+        script=script,
+        style_hash=_hash(style),
+        script_hash=_hash(script),
+        heading=escape(PurePath(report.name).name or report.name),
+        command=escape(report.command),
+        subject=escape(title(report)),
+        outcome="valid" if report.valid else "wrong",
+        verdict=_verdict(report),
+        lead=_lead(report),
+        picture=escape(_in_words(drawn.scene)),
+        stages=_stages(drawn.scene),
+        legend=_legend(report, drawn.scene),
+        keys=_keys(drawn.scene.dimension),
+        quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)),
+        requirements=_requirements(report),
+        and_convergence=" and convergence" if drawn.convergence else "",
+        charts=_charts(report, drawn),
+        worst=_worst(report, drawn),
+        made=_made(report, options),
+        report=_json(to_json(replace(report, everything=False))),
+        scene=_json(_scene(drawn.scene)),
+    )
+
+
+def _hash(text: str) -> str:
+    return f"sha256-{base64.b64encode(sha256(text.encode()).digest()).decode()}"
+
+
+def _json(value: object) -> str:
+    """Return JSON that cannot end the script element it stands in."""
+    return json.dumps(value, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _table(caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Sequence[str]]], style: str = "") -> str:
+    """Return a table of text; it scrolls by itself where the page is narrower."""
+    first, *others = (escape(column) for column in columns)
+    corner = f'<th scope="col">{first}</th>' if first else "<td></td>"
+    head = corner + "".join(f'<th scope="col">{column}</th>' for column in others)
+    body = "".join(
+        f'<tr><th scope="row">{escape(name)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in cells)}</tr>'
+        for name, cells in rows
+    )
+    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", style)
+
+
+def _scrolled(caption: str, content: str, style: str = "") -> str:
+    return (
+        f'<div class="wide" role="region" tabindex="0" aria-label="{escape(caption)}">'
+        f'<table class="{style}"><caption>{escape(caption)}</caption>{content}</table></div>'
+    )
+
+
+def _verdict(report: Report) -> str:
+    word = "Valid" if report.valid else "Not valid"
+    lines = [*verdict(replace(report, everything=False), listing=False), *(f"note: {note}" for note in report.notes)]
+    lines = [line.removeprefix("valid: ").removeprefix("NOT VALID: ") for line in lines]
+    return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{escape(line)}</p>" for line in lines)
+
+
+def _lead(report: Report) -> str:
+    """Return the numbers that matter most, of the result and of the mesh as it came."""
+    boxes = ""
+    for name, values in quality_rows(report)[:4]:
+        was = f' <span class="was">from {escape(values[0])}</span>' if len(values) > 1 else ""
+        boxes += f"<div><dt>{escape(name)}</dt><dd>{escape(values[-1])}{was}</dd></div>"
+    return f'<dl class="lead">{boxes}</dl>'
+
+
+def _in_words(scene: Scene) -> str:
+    counts = ", ".join(f"{state.count:,} inverted {stage}" for stage, state in scene.states.items())
+    what = "Plane view" if scene.dimension == 2 else "Three-dimensional view"
+    return f"{what} of the mesh and its {SIMPLICES[scene.dimension].shape.plural}: {counts}"
+
+
+def _stages(scene: Scene) -> str:
+    radios = ""
+    for i, (name, state) in enumerate(scene.states.items()):
+        shown = len(state.inverted)
+        words = f"{name}: {state.count:,} inverted element{'s' * (state.count != 1)}"
+        if state.left_out:
+            words += f", of which {shown:,} are drawn"
+        radios += (
+            f'<label><input type="radio" name="stage" value="{i}" data-drawn="{escape(words)}"'
+            f"{' checked' * (i == 0)}>{escape(name)}</label>"
+        )
+    return radios
+
+
+def _legend(report: Report, scene: Scene) -> str:
+    boundary = "boundary, drawn coarsely" if scene.coarse else "boundary"
+    if scene.dimension == 2 and any(len(state.cells) for state in scene.states.values()):
+        boundary = "all elements"
+    count = len(list(scene.states.values())[-1].worst)
+    worst = f"the worst {count}" if count > 1 else "the worst one"
+    items = {"inverted": "inverted elements", "worst": f"{worst} of the {_result(report)}", "boundary": boundary}
+    return "\n".join(f'<li><i class="{style}"></i>{words}</li>' for style, words in items.items())
+
+
+def _keys(dimension: int) -> str:
+    if dimension == 2:
+        return "Drag to move, wheel or pinch to zoom. Keys: arrows move, + and − zoom, 0 resets."
+    return (
+        "Drag to turn, wheel or pinch to zoom, drag with Shift or two fingers to move. "
+        "Keys: arrows turn, + and − zoom, 0 resets."
+    )
+
+
+def _requirements(report: Report) -> str:
+    style = {True: "met", False: "unmet"}
+    items = "".join(f'<li class="{style[met]}">{escape(text)}</li>' for met, text in required(report))
+    return f'<ul class="plain">{items}</ul>' if items else ""
+
+
+def _charts(report: Report, drawn: Figures) -> str:
+    shape = report.mesh.topology.element.shape
+    angle, measure = shape.angle, shape.measure
+    bins = len(report.result.histogram)
+    counts = [
+        (f"{i * BIN_WIDTH:.0f}–{(i + 1) * BIN_WIDTH:.0f}°", [f"{one[i]:,}" for one in drawn.histograms.values()])
+        for i in range(bins)
+    ]
+    numbers = _table("Elements by their smallest angle", ["smallest angle", *drawn.histograms], counts)
+    result = _figure(f"Elements by their smallest {angle}", charts.histogram(drawn.histograms, angle), numbers)
+    if drawn.convergence is None:
+        return result
+    result += _figure("Inverted elements, logarithmic", charts.inverted(drawn.convergence), _sweeps(report, measure))
+    return result + _figure(f"Size of the smallest {measure}, logarithmic", charts.measures(drawn.convergence, measure))
+
+
+def _figure(caption: str, svg: str, numbers: str = "") -> str:
+    details = f"<details><summary>The numbers</summary>{numbers}</details>" if numbers else ""
+    return f"<figure><figcaption>{escape(caption)}</figcaption>{svg}{details}</figure>\n"
+
+
+def _sweeps(report: Report, measure: str) -> str:
+    rows = [
+        (str(i), [one.phase, f"{one.inverted:,}", f"{one.min_measure:.3g}", f"{one.moved:,}", f"{one.seconds:.3g}"])
+        for i, one in enumerate(report.records)
+    ]
+    columns = ["sweep", "phase", "inverted", f"smallest {measure}", "moved", "seconds"]
+    return _table("Every sweep", columns, rows)
+
+
+def _worst(report: Report, drawn: Figures) -> str:
+    shape = report.mesh.topology.element.shape
+    angle, measure = shape.angle, shape.measure
+    columns = ["element", "picture", f"smallest {angle} [°]", measure, "inverted", "centroid"]
+    head = "".join(f'<th scope="col">{column}</th>' for column in columns)
+    body = "".join(_worst_row(one, drawn.scene) for one in drawn.worst)
+    count = f"{len(drawn.worst)} worst elements" if len(drawn.worst) > 1 else "worst element"
+    caption = f"The {count} of the {_result(report)}, as the file numbers them"
+    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>")
+
+
+def _worst_row(one: Worst, scene: Scene) -> str:
+    corners = _placed(one.corners, scene).astype(float)
+    reach = np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()
+    place = [*corners.mean(axis=0), *[0.0] * (3 - scene.dimension), max(float(reach), 1e-6)]
+    cells = f"<td>{one.angle:.3f}</td><td>{one.measure:.3g}</td>"
+    cells += '<td class="inverted">yes</td>' if one.inverted else "<td>no</td>"
+    cells += f"<td>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
+    data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
+    button = f'<button type="button" hidden {data} aria-label="Show element {one.id}">Show</button>'
+    return f'<tr><th scope="row">{one.id}</th><td>{button}</td>{cells}</tr>'
+
+
+def _result(report: Report) -> str:
+    return "result" if len(report.stages) > 1 else "mesh"
+
+
+def _made(report: Report, options: Mapping[str, str]) -> str:
+    lines = [("file", [report.name]), *((name, [value]) for name, value in options.items())]
+    if report.records:
+        lines.append(("sweeps", ["; ".join(phases(report))]))
+    lines += [(f"process {rank}", [text]) for rank, text in enumerate(processes(report))]
+    lines += [(package, [_version(package)]) for package in PACKAGES]
+    lines.append(("Python", [f"{platform.python_version()}, {platform.system()} {platform.machine()}"]))
+    return _table("Options and versions", ["", "value"], lines, "words")
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed as a package"
+
+
+def _placed(points: Numbers, scene: Scene) -> NDArray[np.float32]:
+    """Return points (k, d) relative to the middle of the mesh and its size."""
+    middle, extent = scene.frame
+    return np.clip((points - middle) / np.linalg.norm(extent), -FARTHEST, FARTHEST).astype(np.float32)
+
+
+def _scene(scene: Scene) -> dict[str, Any]:
+    """Return what the page's script draws.
+
+    `points` are base64 of float32, `rows` of uint16 or, where wide, of uint32; layers name both by their place there.
+    """
+    points, extent = [scene.boundary], scene.frame[1]
+    layers: list[dict[str, Any]] = []
+    # One array, such as that of all cells, may be drawn in several stages.
+    rows: dict[int, NDArray[np.int32]] = {}
+
+    def add(role: str, corners: NDArray[np.int32], stage: int | None = None) -> None:
+        if len(corners):
+            rows.setdefault(id(corners), corners)
+            place = {"points": len(points) - 1, "rows": list(rows).index(id(corners))}
+            layers.append({"role": role, "corners": corners.shape[1], "stage": stage, **place})
+
+    add("boundary", scene.facets)
+    add("creases", scene.creases)
+    for stage, state in enumerate(scene.states.values()):
+        points.append(state.points)
+        add("cells", state.cells, stage)
+        add("inverted", state.inverted, stage)
+        add("worst", state.worst, stage)
+    return {
+        "dimension": scene.dimension,
+        "extent": (extent / np.linalg.norm(extent)).tolist(),
+        "points": [_base64(_placed(one, scene)) for one in points],
+        "rows": [_numbered(one) for one in rows.values()],
+        "layers": layers,
+    }
+
+
+def _numbered(rows: NDArray[np.int32]) -> dict[str, Any]:
+    wide = bool(rows.max(initial=0) >= 2**16)
+    return {"wide": wide, "data": _base64(rows.astype(np.uint32 if wide else np.uint16))}
+
+
+def _base64(values: NDArray[Any]) -> str:
+    return base64.b64encode(values.astype(values.dtype.newbyteorder("<")).tobytes()).decode()

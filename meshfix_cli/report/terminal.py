@@ -1,0 +1,166 @@
+"""Reports on a terminal or in a log. The only importer of rich."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from meshfix_cli.mesh.elements import MEASURES
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality.summary import BIN_WIDTH
+from meshfix_cli.report.as_json import to_json
+from meshfix_cli.report.facts import (
+    STATUSES,
+    Report,
+    Tally,
+    before_and_after,
+    phases,
+    processes,
+    quality_rows,
+    required,
+    title,
+    verdict,
+)
+
+if TYPE_CHECKING:
+    from meshfix_cli.solve.records import SweepRecord
+
+_BARS = " ▁▂▃▄▅▆▇█"
+
+
+def console(stream: Any) -> Console:
+    """Return a console for a stream; plain text of 100 columns where that is not a terminal."""
+    if hasattr(stream, "reconfigure"):
+        stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
+    return Console(file=stream, width=None if stream.isatty() else 100, highlight=False)
+
+
+def print_report(report: Report, out: Console) -> None:
+    """Print the quality table, the phases, the notes and a verdict in plain words."""
+
+    def line(text: str, style: str = "") -> None:
+        out.print(Text(text, style=style), soft_wrap=True)
+
+    line(title(report))
+    out.print(_quality_table(report))
+    for text in phases(report):
+        line(text)
+    for rank, text in enumerate(processes(report)):
+        line(f"process {rank}: {text}")
+    for note in report.notes:
+        line(f"note: {note}")
+    for text in verdict(report):
+        line(text, "bold green" if report.valid else "bold red")
+    for met, text in required(report):
+        line(text, "green" if met else "bold red")
+
+
+def print_json(report: Report, out: Console) -> None:
+    """Print one JSON object, on one line."""
+    out.file.write(json.dumps(to_json(report), allow_nan=False) + "\n")
+
+
+def print_result(result: Mapping[str, Any], out: Console, as_json: bool) -> None:
+    """Print one line at once, so that the log of a batch that is killed tells what was done."""
+    if as_json:
+        out.file.write(json.dumps(result, allow_nan=False) + "\n")
+    elif result["status"] != "failed":
+        out.print(Text(_result_line(result)), soft_wrap=True)
+    out.file.flush()
+
+
+def print_tally(tally: Tally, seconds: float, out: Console) -> None:
+    """Print the summary of a batch."""
+    table, files = Table("", "before", "after"), tally.statuses.total()
+    if not files:
+        out.print("no file falls to this shard: nothing was done")
+        return
+    for column in table.columns[1:]:
+        column.justify = "right"
+    table.add_row("files", "", f"{files:,}")
+    for status, label in STATUSES.items():
+        table.add_row(label, "", f"{tally.statuses[status]:,}")
+    table.add_row("elements", "", f"{tally.elements:,}")
+    table.add_row("inverted elements", *(f"{count:,}" for count in tally.inverted))
+    table.add_row(
+        "smallest angle of all [°]", *(f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle)
+    )
+    out.print(table)
+    out.print(Text(f"{seconds:.3g} s, {files / max(seconds, 1e-9):,.2f} files a second"))
+
+
+def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> Iterator[dict[str, Any]]:
+    """Pass results through and show on a terminal how many there are; the line is gone while one is looked at."""
+    if not out.is_terminal:
+        yield from results
+        return
+    with out.status(f"0 of {total:,} files") as status:
+        for done, result in enumerate(results, 1):
+            status.stop()
+            yield result
+            status.update(f"{done:,} of {total:,} files")
+            status.start()
+
+
+def with_progress(
+    run: Iterable[tuple[Mesh, SweepRecord]], out: Console, every_sweep: bool = False
+) -> Iterator[tuple[Mesh, SweepRecord]]:
+    """Pass the steps through and show them as they come: on a terminal one live line, which is gone at the end.
+
+    `every_sweep`: a plain line for each of them as well.
+    """
+    if not (out.is_terminal or every_sweep):
+        yield from run
+        return
+    with out.status("building the topology") if out.is_terminal else nullcontext() as status:
+        for mesh, record in run:
+            text = _sweep(record, mesh.dimension)
+            if status is not None:
+                status.update(text)
+            if every_sweep:
+                out.print(Text(f"{text}, {record.moved:,} vertices moved, {record.seconds:.3g} s"), soft_wrap=True)
+            yield mesh, record
+
+
+def _sweep(record: SweepRecord, dimension: int) -> str:
+    name = f"{record.phase} {record.sweep}" if record.sweep else record.phase
+    return f"{name}: {record.inverted:,} inverted, smallest {MEASURES[dimension]} {record.min_measure:.3g}"
+
+
+def _result_line(result: Mapping[str, Any]) -> str:
+    before, after = before_and_after(result)
+    parts = [f"{result['file']}: {STATUSES[result['status']]}"]
+    if before and after:
+        parts.append(f"{before['inverted']:,} inverted -> {after['inverted']:,}")
+        parts.append(f"smallest angle {before['min_angle']:.3f}° -> {after['min_angle']:.3f}°")
+    parts += [f"NOT MET: {one['requirement']}" for one in result["requirements"] if not one["met"]]
+    if result["misnumbered"]:
+        parts.append(f"{result['misnumbered']:,} numbered against the rest of the mesh")
+    if result["obstacles"]["crossing"]:
+        parts.append("the fixed boundary crosses itself")
+    return ", ".join([*parts, f"{result['seconds']:.3g} s"])
+
+
+def _quality_table(report: Report) -> Table:
+    table = Table("")
+    for stage in report.stages:
+        table.add_column(stage, justify="right")
+    for label, values in quality_rows(report):
+        table.add_row(label, *values)
+    bars = (_bars(summary.histogram) for summary in report.stages.values())
+    width = len(report.result.histogram) * BIN_WIDTH
+    table.add_row(f"smallest angles, 0 to {width:.0f}°", *bars)
+    return table
+
+
+def _bars(histogram: Sequence[int]) -> str:
+    """One character a bin; any element at all shows."""
+    top = max(histogram) or 1
+    return "".join(_BARS[-(-count * (len(_BARS) - 1) // top)] for count in histogram)

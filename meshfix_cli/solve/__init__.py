@@ -1,0 +1,1 @@
+"""How a mesh is untangled and smoothed, or tangled."""

@@ -1,0 +1,71 @@
+"""The paper's tangling protocol, section 4. Light to import, as the command line reads `Distance`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Distance:
+    """A length in model units, or in mean edge lengths h."""
+
+    value: float
+    in_h: bool
+
+    @classmethod
+    def parse(cls, text: str) -> Distance:
+        """Read `2h`, `h` or `0.3`; ValueError for anything else, negative and infinite numbers included."""
+        number, in_h = (text[:-1] or "1", True) if text.endswith("h") else (text, False)
+        value = float(number)
+        if not (math.isfinite(value) and value >= 0):
+            raise ValueError(text)
+        return cls(value, in_h)
+
+    def __str__(self) -> str:
+        return f"{self.value:g}{'h' * self.in_h}"
+
+    def length(self, mesh: Mesh, threads: int = 1) -> float:
+        """Return the length in model units of a mesh."""
+        return self.value * (mesh.mean_edge_length(threads) if self.in_h else 1.0)
+
+
+def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple[Mesh, int]:
+    """Move some interior vertices by a distance in random directions.
+
+    From the seed come one permutation of the free vertices and one direction for every vertex; so in a series
+    of percentages or distances the same vertices move in the same directions.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    percent : float
+        Of all vertices, as in the paper; where that is more than there are free vertices, all of those move.
+    distance : float
+        Model units.
+    seed : int
+
+    Returns
+    -------
+    mesh : Mesh
+    moved : int
+        Number of vertices moved.
+
+    Notes
+    -----
+    Source: section 4, the two series of perturbed meshes.
+    """
+    import numpy as np
+
+    random = np.random.default_rng(seed)
+    order = random.permutation(np.flatnonzero(mesh.movable))
+    directions = random.standard_normal(mesh.points.shape)
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    chosen = order[: round(percent / 100 * int(mesh.topology.used.sum()))]
+    points = mesh.points.copy()
+    points[chosen] += distance * directions[chosen]
+    return mesh.with_points(points), len(chosen)

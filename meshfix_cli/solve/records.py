@@ -1,0 +1,85 @@
+"""What a run tells of itself: a record of each sweep, and the outcome."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
+    from meshfix_cli.quality.obstacles import Obstacles
+
+
+@dataclass(frozen=True)
+class SweepRecord:
+    """What one sweep did.
+
+    Attributes
+    ----------
+    phase : str
+        "input" for the mesh as it came, "best" where an unsuccessful strategy went back to its best mesh.
+    sweep : int
+        From 1 in each phase.
+    inverted : int
+        Elements that are not valid after the sweep.
+    min_measure : float
+        Smallest signed area or volume, in model units.
+    moved : int
+        Vertices whose position changed.
+    seconds : float
+        Wall time, the check included; of the input, that of building the stars.
+    """
+
+    phase: str
+    sweep: int
+    inverted: int
+    min_measure: float
+    moved: int
+    seconds: float
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """Smaller is better: fewer inverted elements, then a larger smallest measure."""
+        return self.inverted, -self.min_measure
+
+
+@dataclass(frozen=True)
+class RankRecord:
+    """What one of several processes held and sent.
+
+    Attributes
+    ----------
+    vertices, ghosts, elements : int
+        Its own vertices, those of others of which it had copies, and the elements of its stars.
+    peak_mb : float or None
+        The most memory it ever had, in 10^6 bytes; None: the system does not tell.
+    messages, megabytes : int, float
+        What it sent to others in the sweeps.
+    """
+
+    vertices: int
+    ghosts: int
+    elements: int
+    peak_mb: float | None
+    messages: int
+    megabytes: float
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A mesh before, after untangling and after smoothing, the record of every sweep, and what cannot be mended.
+
+    `ranks` are the processes, where there were several.
+    """
+
+    before: Mesh
+    untangled: Mesh
+    after: Mesh
+    records: tuple[SweepRecord, ...]
+    obstacles: Obstacles
+    ranks: tuple[RankRecord, ...] = ()
+
+    @property
+    def valid(self) -> bool:
+        """No element of the result is inverted, by its shape or by its numbering, and no boundary crosses itself."""
+        return self.records[-1].inverted == 0 and not (self.obstacles or self.after.topology.misnumbered.any())

@@ -1,0 +1,114 @@
+"""The strategies of section 4 and the smoothing of section 3.3 as data: phases, and the moves of their sweeps.
+
+Light to import: the command line reads `STRATEGIES` for its help.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import IntEnum
+from typing import Literal
+
+SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
+SMOOTH = 3  # section 4: three passes of smoothing
+MOST_PASSES = 1_000_000
+THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
+SMOOTHING = "smoothing"
+RATIO_SWEEPS = 2  # of "best": later ones gain little
+ANGLE_SWEEPS = 3
+
+
+class Move(IntEnum):
+    """Codes of the vertex moves in kernels/moves/relocate.hpp."""
+
+    LAPLACIAN = 0
+    UNTANGLE = 1
+    COMBINED_UNTANGLE = 2
+    SMART_LAPLACIAN = 3
+    COMBINED_SMOOTH = 4
+    UNTANGLE_HEIGHTS = 5
+    MEAN_RATIO = 6
+    RAISE_SMALLEST = 7
+    MEAN_ANGLE = 8
+
+
+@dataclass(frozen=True)
+class Phase:
+    """Sweeps of vertex moves, or minimisations of the foldover-free energy.
+
+    Attributes
+    ----------
+    name : str
+        As shown in the report.
+    moves : tuple of Move
+        Those of the sweeps, in turn. None: the phase minimises the energy of `foldover.py`.
+    max_sweeps : int or None
+        None: the limit of all untangling sweeps, `SWEEPS` where there is none.
+    until : {"valid", "stalled", "settled", "ceiling"}
+        When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for `PATIENCE`
+        turns through the moves neither were there fewer inverted elements nor was the smallest measure larger;
+        "settled": no vertex moved, which stops every phase; "ceiling": the smallest sine is that of the simplices
+        without a free vertex, or does not rise any more. The last two are phases of smoothing.
+    only_invalid : bool
+        LP moves visit only stars with an inverted element and those whose neighbours moved in the sweep before.
+    from_best : bool
+        Start from the best mesh met so far, that of the input included, not from the last.
+    rings : tuple of (int or None)
+        The energy's regions, to be tried one after the other: so many rings around the inverted elements; None: the
+        whole mesh.
+    """
+
+    name: str
+    moves: tuple[Move, ...] = ()
+    max_sweeps: int | None = None
+    until: Literal["valid", "stalled", "settled", "ceiling"] = "valid"
+    only_invalid: bool = False
+    from_best: bool = False
+    rings: tuple[int | None, ...] = ()
+
+    @property
+    def smooths(self) -> bool:
+        """Whether it is a phase of smoothing."""
+        return self.until in ("settled", "ceiling")
+
+
+_LAPLACIAN = Phase("Laplacian", (Move.LAPLACIAN,))
+_LP = Phase("LP", (Move.UNTANGLE,))
+_LP_CYCLES = (*(Move.UNTANGLE_HEIGHTS,) * 3, Move.SMART_LAPLACIAN)
+_FOLDOVER = Phase("FF", max_sweeps=120, from_best=True, rings=(None,))
+STRATEGIES: dict[str, tuple[Phase, ...]] = {
+    "auto": (
+        replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled"),
+        Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True),
+        replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
+        _FOLDOVER,
+    ),
+    "LS": (_LAPLACIAN,),
+    "US": (_LP,),
+    "CS": (Phase("Laplacian or LP", (Move.COMBINED_UNTANGLE,)),),
+    "LUS": (replace(_LAPLACIAN, max_sweeps=3), _LP),
+    "FF": (_FOLDOVER,),
+}
+
+# After the passes at the threshold: what makes angles regular, the mean angle, then the few that are below the ceiling.
+_BEST = (
+    Phase(f"{SMOOTHING} the mean ratio", (Move.MEAN_RATIO,), RATIO_SWEEPS, until="settled"),
+    Phase(f"{SMOOTHING} the mean angle", (Move.MEAN_ANGLE,), ANGLE_SWEEPS, until="settled"),
+    Phase(f"{SMOOTHING} the worst", (Move.RAISE_SMALLEST,), until="ceiling"),
+)
+
+
+def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH) -> tuple[Phase, ...]:
+    """Return the phases of a strategy and those of smoothing: so many passes, or the best that can be had.
+
+    Raises
+    ------
+    KeyError, ValueError
+        There is no such strategy, or no such smoothing.
+    """
+    if smooth != "best" and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
+        raise ValueError(f'smooth is {smooth!r}, and must be a number of passes or "best"')
+    passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), SMOOTH, until="settled", from_best=True)
+    if smooth == "best":
+        return (*STRATEGIES[strategy], passes, *_BEST)
+    return (*STRATEGIES[strategy], replace(passes, max_sweeps=smooth))

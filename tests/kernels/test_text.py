@@ -1,0 +1,190 @@
+"""Numbers in text: Python's own float and int are the oracle."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from meshfix_cli import kernels
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.splice import Edits, Places, apply
+from meshfix_cli.meshfile.text import integers, integers_at, line_words, numbers_at, words
+
+DOUBLE, SINGLE = np.dtype("f8"), np.dtype("f4")
+
+
+def spread(random: np.random.Generator, n: int) -> np.ndarray:
+    """Doubles of every size, and those near which printing goes wrong."""
+    bits = random.integers(0, 2**64, n, dtype=np.uint64).view(np.float64)
+    some = [
+        0.0,
+        -0.0,
+        1.0,
+        0.1,
+        1 / 3,
+        1e5,
+        1e22,
+        1e23,
+        2.0**-1074,
+        2.0**-1022,
+        1.7976931348623157e308,
+        123456.0,
+        9.5e-5,
+    ]
+    return np.concatenate([bits[np.isfinite(bits)], random.random(n), some])
+
+
+def test_words_are_what_python_splits(random: np.random.Generator) -> None:
+    alphabet = b"ab1. ,\n\t\r"
+    for _ in range(200):
+        data = bytes(random.choice(list(alphabet), random.integers(1, 60)).astype(np.uint8))
+        expected = [match.span() for match in re.finditer(rb"[^\s,]+", data)]
+        assert words(data, 0, len(expected)).tolist() == [list(span) for span in expected]
+        with pytest.raises(ReadError, match="is truncated"):
+            words(data, 0, len(expected) + 1)
+        first = re.split(rb"[\r\n]", data)[0]
+        found = line_words(data, [0], 4)[0]
+        assert [data[a:b] for a, b in found.tolist() if a >= 0] == re.findall(rb"[^\s,]+", first)[:4]
+
+
+def test_shortest_numbers_read_back_and_are_no_longer_than_pythons(random: np.random.Generator) -> None:
+    values = spread(random, 5000)
+    text, spans = kernels.shortest(values, False, 0)
+    read = numbers_at(text, spans, DOUBLE)
+    assert read.tobytes() == values.tobytes()
+    for (first, last), value in zip(spans.tolist(), values.tolist(), strict=True):
+        assert float(text[first:last]) == value
+        assert last - first <= len(repr(value))
+
+
+def test_shortest_floats_read_back(random: np.random.Generator) -> None:
+    bits = random.integers(0, 2**32, 5000, dtype=np.uint32).view(np.float32)
+    values = bits[np.isfinite(bits)]
+    text, spans = kernels.shortest(values.astype(np.float64), True, 0)
+    assert numbers_at(text, spans, SINGLE).tobytes() == values.tobytes()
+    assert all(last - first <= len(str(value)) for (first, last), value in zip(spans.tolist(), values, strict=True))
+
+
+def test_numbers_that_must_be_short_have_the_most_digits_that_fit(random: np.random.Generator) -> None:
+    values = spread(random, 2000)
+    text, spans = kernels.shortest(values, False, 20)
+    assert (np.diff(spans, axis=1) <= 20).all()
+    normal = np.abs(values) > 1e-300
+    np.testing.assert_allclose(numbers_at(text, spans, DOUBLE)[normal], values[normal], 1e-12)
+    places = Places.of_text(spans.reshape(-1, 1, 2), longest=20)
+    rounded = places.rounded(values.reshape(-1, 1))
+    np.testing.assert_array_equal(places.rounded(rounded), rounded)
+
+
+@pytest.mark.parametrize(
+    "text", ["1", "+1", "-1.5", ".5", "5.", "1e3", "1E+03", "1e-400", "1e999", "nan", "-inf", "0x1", "+-1", "1f"]
+)
+def test_numbers_are_pythons(text: str) -> None:
+    data = text.encode()
+    spans = np.array([[0, len(data)]])
+    try:
+        expected = float(text.replace("_", "x"))
+    except ValueError:
+        with pytest.raises(ReadError, match=re.escape(f"line 1: '{text}' is not a number")):
+            numbers_at(data, spans, DOUBLE)
+        return
+    assert numbers_at(data, spans, DOUBLE).tobytes() == np.array([expected]).tobytes()
+
+
+def test_exponents_of_fortran() -> None:
+    data = b"1.5D+02 -2d-1"
+    assert numbers_at(data, words(data, 0, 2), DOUBLE).tolist() == [150.0, -0.2]
+
+
+def test_integers_end_at_a_slash_and_nothing_else() -> None:
+    data = b"12/3/4 -5//6 +7"
+    assert integers_at(data, words(data, 0, 3), slash=True).tolist() == [12, -5, 7]
+    with pytest.raises(ReadError, match="'12/3/4' is not an integer"):
+        integers_at(data, words(data, 0, 3))
+    for bad in (b"1.5", b"x", b"99999999999999999999", b"1-", b"1/2"):
+        with pytest.raises(ReadError, match=f"line 2: '{bad.decode()}' is not an integer"):
+            integers(b"1\n" + bad, 0, 2)
+
+
+def test_integers_stop_behind_the_last_and_tell_the_end() -> None:
+    values, end = integers(b" 1 2,3\n4", 0, 3)
+    assert (values.tolist(), end) == ([1, 2, 3], 6)
+    with pytest.raises(ReadError, match="is truncated"):
+        integers(b"1 2", 0, 10**15)
+
+
+def test_edits_in_any_order_change_nothing_else() -> None:
+    data = b"a 1 b 22 c"
+    late = Edits(np.array([[6, 8]]), b"333", np.array([[0, 3]]))
+    early = Edits(np.array([[2, 3]]), b"", np.array([[0, 0]]))
+    assert apply(data, [late, early]) == b"a  b 333 c"
+    with pytest.raises(ValueError, match="overlap"):
+        apply(data, [early, early])
+
+
+def test_the_first_two_corners_change_places() -> None:
+    data = b"3 10/1 2 30\n3 4 5 6"
+    places = Places.of_text(line_words(data, [2, 14], 3), "i8")
+    assert apply(data, [places.exchange(data, np.array([0]))]) == b"3 2 10/1 30\n3 4 5 6"
+    rows = np.arange(6, dtype=">i4").tobytes()
+    binary = Places.of_rows(np.array([0, 12]), 3, ">i4")
+    after = np.frombuffer(apply(rows, [binary.exchange(rows, np.array([1]))]), dtype=">i4")
+    assert after.tolist() == [0, 1, 2, 4, 3, 5]
+
+
+@pytest.fixture(params=[1, 2, 3])
+def threads(request: pytest.FixtureRequest) -> Iterator[int]:
+    """How many threads the passes over text may take; one again at the end."""
+    kernels.use_threads(request.param)
+    yield request.param
+    kernels.use_threads(1)
+
+
+@pytest.mark.parametrize("gap", [" ", "\n", ", \r\n", " " * 3000])
+def test_long_texts_are_read_in_pieces(threads: int, gap: str, random: np.random.Generator) -> None:
+    """Pieces end anywhere: in words, between them, and in gaps that are longer than they are."""
+    expected = random.integers(-(10 ** random.integers(1, 9, 300_000 if len(gap) < 9 else 400)), 10**9)
+    data = (gap + gap.join(map(str, expected.tolist()))).encode()
+    for count in (1, 2, 77, len(expected) - 1, len(expected)):
+        values, end, bad = kernels.scan_integers(data, 0, count)
+        assert (values.dtype.name, bad) == ("int32", -1)
+        np.testing.assert_array_equal(values, expected[:count])
+        spans = words(data, 0, count)
+        assert end == spans[-1, 1] == kernels.behind_words(data, 0, count)
+        np.testing.assert_array_equal(integers_at(data, spans), expected[:count])
+        np.testing.assert_array_equal(numbers_at(data, spans, DOUBLE), expected[:count])
+    assert kernels.behind_words(data, 0, len(expected) + 1) == -1
+    values, _, bad = kernels.scan_integers(data, 0, len(expected) + 1)
+    assert (len(values), bad) == (len(expected), len(data))
+
+
+def test_the_first_bad_word_of_a_long_text_is_named(threads: int) -> None:
+    data = bytearray(b"123456 " * 200_000)
+    for at in (7 * 150_000, 7 * 90_001):
+        data[at : at + 3] = b"1.5"
+        values, end, bad = kernels.scan_integers(bytes(data), 0, 200_000)
+        assert (len(values), end, bad) == (at // 7, at - 1, at)
+        _, row = kernels.integers(bytes(data), words(bytes(data), 0, 200_000), False)
+        assert row == at // 7
+
+
+def test_integers_take_64_bits_where_they_need_them(threads: int) -> None:
+    for largest, dtype in ((2**31 - 1, "int32"), (2**31 + 1, "int64"), (2**62, "int64")):
+        values, _, bad = kernels.scan_integers(b"1 " * 100_000 + str(-largest).encode(), 0, 100_001)
+        assert (values.dtype.name, int(values[-1]), bad) == (dtype, -largest, -1)
+
+
+def test_long_texts_are_written_in_pieces(threads: int, random: np.random.Generator) -> None:
+    values = random.random(100_000)
+    text, spans = kernels.shortest(values, False, 0)
+    assert [text[a:b] for a, b in spans[:: len(spans) // 99].tolist()] == [
+        repr(value).encode() for value in values[:: len(spans) // 99].tolist()
+    ]
+    data = b"(x) " * len(values)
+    at = 4 * np.arange(len(values)) + 1
+    expected = b"".join(b"(" + text[a:b] + b") " for a, b in spans.tolist())
+    assert kernels.replace(data, np.stack([at, at + 1], axis=1), text, spans) == expected
+    assert kernels.replace(b"abc", np.empty((0, 2), dtype=np.int64), b"", np.empty((0, 2), dtype=np.int64)) == b"abc"

@@ -1,0 +1,100 @@
+"""Everything that the README and the pages in docs/ show is run, and prints what they say it prints."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from meshfix_cli.cli import main
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text()
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+TEXT = "\n".join(page.read_text() for page in PAGES)
+
+SECONDS = re.compile(r"\d[\d.,e-]* (s\b|files a second)")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+
+
+def commands() -> list[tuple[str, str]]:
+    """Commands and the output shown below each."""
+    shown = []
+    for block in blocks("console"):
+        for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+            command, _, output = part.partition("\n")
+            if not command.startswith("make"):
+                shown.append((command, output))
+    return shown
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "sample_meshes").symlink_to(ROOT / "sample_meshes")
+    return tmp_path
+
+
+def run(command: list[str], folder: Path) -> str:
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    environment = {**os.environ, "PATH": path, "PYTHONIOENCODING": "utf-8"}
+    done = subprocess.run(command, capture_output=True, check=False, cwd=folder, env=environment)
+    assert done.returncode in (0, 3), done.stderr.decode()
+    return done.stdout.decode()
+
+
+def test_commands_print_what_is_shown(folder: Path) -> None:
+    assert len(commands()) >= 5
+    for command, output in commands():
+        printed = run(["bash", "-o", "pipefail", "-c", command], folder)
+        assert SECONDS.sub("", printed) == SECONDS.sub("", output), command
+
+
+def test_python_example_prints_what_is_shown(folder: Path) -> None:
+    (example,) = blocks("python")
+    (output,) = blocks("text")
+    assert run([sys.executable, "-c", example], folder) == output
+
+
+def test_options_of_commands_for_clusters_exist() -> None:
+    commands = re.findall(r"meshfix (\w+) ([^\n]*)", "".join(blocks("sh")))
+    assert {name for name, _ in commands} == {"batch", "untangle"}
+    for name, arguments in commands:
+        known = {option for parameter in main.commands[name].params for option in parameter.opts}
+        assert set(re.findall(r"--[a-z-]+", arguments.partition(":::")[0])) <= known
+
+
+def test_make_targets_exist() -> None:
+    targets = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"make ([a-z]+)", TEXT)) <= targets
+
+
+def test_links_lead_somewhere() -> None:
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#]+)", page.read_text()):
+            assert target.startswith("https://") or (page.parent / target).exists(), (page.name, target)
+
+
+def test_pictures_are_made_by_make_figures() -> None:
+    pictures = set(re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README))
+    assert pictures
+    made = (ROOT / "Makefile").read_text().partition("\nfigures:")[2].partition("\n\n")[0]
+    assert all(picture in made for picture in pictures)
+
+
+def test_the_picture_of_the_plate_is_what_the_tool_draws(folder: Path) -> None:
+    """But for the release of matplotlib, which is named in it and may place things otherwise."""
+    pytest.importorskip("matplotlib", reason="without matplotlib nothing is plotted: pip install 'meshfix-cli[plot]'")
+    command = ["untangle", "--quiet", "--dry-run", "--plot", "plate.svg", "sample_meshes/plate_tangled.vtk"]
+    run([sys.executable, "-m", "meshfix_cli", *command], folder)
+    drawn, kept = (folder / "plate.svg").read_text(), (ROOT / "docs/pictures/plate.svg").read_text()
+    creator = re.compile("<dc:title>Matplotlib v[^<]*")
+    if creator.findall(drawn) == creator.findall(kept):
+        assert drawn == kept
+    assert "before: 89 inverted" in drawn

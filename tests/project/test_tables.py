@@ -1,0 +1,77 @@
+"""Each entry of each table has its documentation and its tests."""
+
+from __future__ import annotations
+
+import importlib
+import re
+
+import pytest
+from places import ROOT
+from splicing import FORMATS
+
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.meshfile.formats import OWN
+from meshfix_cli.quality import formulas
+from meshfix_cli.quality.metrics import METRICS
+from meshfix_cli.solve.strategies import STRATEGIES, Move
+
+DOCS, TESTS, PACKAGE = ROOT / "docs", ROOT / "tests", ROOT / "meshfix_cli"
+
+
+def first_column(page: str, *, heading: str) -> list[str]:
+    """The names in code that begin the rows of a page's tables, behind a heading."""
+    text = (DOCS / page).read_text().partition(heading)[2]
+    return re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_formats(name: str) -> None:
+    module = importlib.import_module(f"meshfix_cli.meshfile.{OWN[name].module}")
+    told = module.__doc__ or ""
+    assert len(told.splitlines()) >= 3  # how the coordinates lie, and a source
+    assert "Source:" in told
+    table = "".join(re.findall(r"^\|.*\n", (DOCS / "files.md").read_text(), re.MULTILINE))
+    assert all(f"`{extension}`" in table for extension in OWN[name].extensions)
+    assert (TESTS / f"meshfile/test_{name}.py").exists()
+    assert (TESTS / f"meshfile/files_{name}.py").exists()
+    assert name in FORMATS or name == "pvtu"  # which is several files, with a table of its own
+
+
+def test_strategies() -> None:
+    assert first_column("method.md", heading="# Method") == list(STRATEGIES)
+    assert 'parametrize("strategy", STRATEGIES)' in (TESTS / "solve/test_untangle.py").read_text()
+
+
+def test_metrics() -> None:
+    assert first_column("quality.md", heading="## Metrics") == list(METRICS)
+    assert all(callable(getattr(formulas, name)) for name in METRICS)
+    assert 'parametrize("name", METRICS)' in (TESTS / "quality/test_metrics.py").read_text()
+
+
+def test_moves() -> None:
+    assert first_column("extending.md", heading="## A move") == [move.name for move in Move]
+    assert 'parametrize("move", list(Move))' in (TESTS / "kernels/test_kernels.py").read_text()
+    code = (PACKAGE / "kernels/moves/relocate.hpp").read_text()
+    names = re.findall(r"\w+", code.partition("enum class Move : int {")[2].partition("}")[0])
+    assert names == [move.name.lower() for move in Move]
+    assert [move.value for move in Move] == list(range(len(Move)))
+
+
+def test_elements() -> None:
+    rows = re.findall(r"^\| (\w[^|]*) \| `(\w+)` \| (\w+) \| (\d*) \| (\d*) \| (solved|held) \|$",
+                      (DOCS / "elements.md").read_text(), re.MULTILINE)  # fmt: skip
+    expected = [
+        (one.shape.name, key, str(one.nodes or "any"), str(one.vtk or ""), str(one.gmsh or ""),
+         "solved" if one.judged_by else "held")
+        for key, one in ELEMENTS.items()
+    ]  # fmt: skip
+    assert rows == expected
+    assert (TESTS / "mesh/test_elements.py").exists()
+
+
+def test_rooms() -> None:
+    """The page for newcomers names the rooms that there are."""
+    rooms = re.findall(r"^\| `([\w.]+)/?` \|", (DOCS / "extending.md").read_text(), re.MULTILINE)
+    rooms = [room for room in rooms if room not in Move.__members__]
+    there = {path.name for path in PACKAGE.iterdir() if path.is_dir()} - {"__pycache__"} | {"repair.py"}
+    assert set(rooms) == there

@@ -1,0 +1,114 @@
+"""What makes a valid mesh impossible is found, and nothing else is."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from geometries import GEOMETRIES
+from meshes import tangle
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels, untangle
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality.obstacles import find_obstacles
+from meshfix_cli.quality.summary import summarise
+
+
+@pytest.mark.parametrize("name", GEOMETRIES)
+def test_nothing_is_found_in_a_valid_boundary(name: str) -> None:
+    mesh = Mesh.build(*GEOMETRIES[name]())
+    assert not find_obstacles(mesh)
+    assert not find_obstacles(tangle(mesh, 100, 8))
+    assert not find_obstacles(mesh.with_fixed(mesh.movable))
+
+
+def strip(angle: float) -> Mesh:
+    """A strip of triangles bent round in its plane by `angle`: beyond a whole turn it overlaps itself."""
+    turn = np.linspace(0.0, angle, 80)
+    rows = [np.column_stack([r * np.cos(turn), r * np.sin(turn)]) for r in (1.0, 1.2, 1.4)]
+    cells = []
+    for k in range(2):
+        a = np.arange(79) + 80 * k
+        cells += [np.column_stack([a, a + 80, a + 1]), np.column_stack([a + 1, a + 80, a + 81])]
+    return Mesh.build(np.concatenate(rows), np.concatenate(cells))
+
+
+def test_a_mesh_that_overlaps_itself_is_not_valid() -> None:
+    """All of its triangles are positive: only the boundary tells."""
+    assert untangle(strip(6.0)).valid
+    mesh = strip(6.6)
+    outcome = untangle(mesh)
+    assert (summarise(mesh).inverted, summarise(mesh).folded) == (0, 0)
+    assert not outcome.valid
+    assert len(outcome.obstacles.crossing) >= 2
+    first = mesh.points[mesh.topology.simplices[outcome.obstacles.crossing]].reshape(-1, 2)
+    assert np.abs(np.arctan2(first[:, 1], first[:, 0])).max() < 0.6  # where the two ends meet
+
+
+def test_a_hole_across_the_rim_is_named_in_2d_and_3d() -> None:
+    for name in ("plate with holes", "box with pipes"):
+        mesh = Mesh.build(*GEOMETRIES[name]())
+        points = mesh.points.copy()
+        hole = (np.linalg.norm(points[:, :2] - [0.8, 1.25], axis=1) < 0.36) & ~mesh.movable
+        points[hole, 1] += 0.5
+        moved = mesh.with_points(points)
+        crossing = find_obstacles(moved).crossing
+        assert len(crossing) > 0
+        corners = points[moved.topology.simplices[crossing]]
+        assert np.abs(corners[..., 1] - 2.0).min(axis=2).max() < 0.35  # near the rim y = 2
+
+
+def test_slits_and_parts_in_contact_do_not_cross() -> None:
+    """Two squares that share a side's positions, not its vertices; then two that overlap, as parts in contact do."""
+    square = np.array([(0.0, 0), (1, 0), (1, 1), (0, 1)])
+    cells = np.array([(0, 1, 2), (0, 2, 3)])
+    for shift in (1.0, 1.0 - 1e-13, 0.5):
+        mesh = Mesh.build(np.concatenate([square, square + np.array([shift, 0.1])]), np.concatenate([cells, cells + 4]))
+        assert not find_obstacles(mesh)
+
+
+def test_a_slit_inside_one_part_does_not_cross() -> None:
+    """A ring cut open along a line: both sides of the cut have the same positions."""
+    mesh = strip(2 * np.pi)
+    assert not find_obstacles(mesh)
+
+
+def test_the_units_and_the_place_do_not_matter() -> None:
+    mesh = strip(6.6)
+    expected = find_obstacles(mesh).crossing.tolist()
+    for scale, offset in ((1e-6, 0.0), (1e9, 0.0), (1.0, 1e4)):
+        moved = Mesh.build(mesh.points * scale + offset, mesh.topology.simplices)
+        assert find_obstacles(moved).crossing.tolist() == expected
+
+
+def brute_force(points: NDArray[np.float64], facets: NDArray[np.int32]) -> set[tuple[int, int]]:
+    """Solve for the point where a segment meets a line or a triangle."""
+    found = set()
+    d = points.shape[1]
+    for a, b in combinations(range(len(facets)), 2):
+        for one, other in ((a, b), (b, a)) if d == 3 else ((a, b),):
+            for p, q in combinations(facets[one], 2):
+                base, *rest = points[facets[other]]
+                matrix = np.column_stack([points[q] - points[p], *(base - r for r in rest)])
+                s, *t = np.linalg.solve(matrix, base - points[p])
+                if 0 < s < 1 and min(t) > 0 and sum(t) < 1:
+                    found.add((a, b))
+    return found
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_crossings_against_brute_force(random: np.random.Generator, d: int) -> None:
+    for size, count in ((0.1, 60), (0.4, 60 if d == 3 else 25)):
+        centres = random.uniform(size=(count, 1, d))
+        points = (centres + random.normal(scale=size, size=(count, d, d))).reshape(-1, d)
+        facets = np.arange(count * d, dtype=np.int32).reshape(count, d)
+        pairs = [tuple(sorted(pair)) for pair in kernels.crossings(points, facets, 1).tolist()]
+        assert len(pairs) == len(set(pairs)) > 5
+        assert set(pairs) == brute_force(points, facets)
+        assert kernels.crossings(points, facets, 3).tolist() == kernels.crossings(points, facets, 1).tolist()
+
+
+def test_no_facets_no_crossings() -> None:
+    assert kernels.crossings(np.zeros((3, 2)), np.zeros((0, 2), dtype=np.int32), 2).shape == (0, 2)

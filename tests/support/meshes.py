@@ -1,0 +1,48 @@
+"""Tangled meshes and stars."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.solve.perturb import perturb
+
+
+def tangle(mesh: Mesh, percent: float = 25, distance: float = 2, seed: int = 0) -> Mesh:
+    """The paper's protocol; the distance in mean edge lengths."""
+    return perturb(mesh, percent, distance * mesh.mean_edge_length(), seed)[0]
+
+
+def star_rows(mesh: Mesh, vertex: int) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.int32]]:
+    """Neighbours (k,), faces (n, d) as positions among them, and simplices (n,) of a vertex."""
+    stars, d = mesh.topology.stars(), mesh.dimension
+    here = int(np.flatnonzero(stars.vertices == vertex)[0])
+    first, last = stars.offsets[here], stars.offsets[here + 1]
+    row = stars.neighbours[stars.neighbour_offsets[here] : stars.neighbour_offsets[here + 1]]
+    faces = np.ascontiguousarray(stars.faces.reshape(-1, d)[first:last])
+    return stars.vertices[row], faces, stars.rows[stars.corners[first:last] // (d + 1)]
+
+
+def star_of(mesh: Mesh, vertex: int) -> tuple[NDArray[np.float64], NDArray[np.uint16]]:
+    """Neighbours (k, d) around the origin and faces (n, d) of a vertex, as the kernels take them."""
+    row, faces, _ = star_rows(mesh, vertex)
+    points = mesh.points[row] - mesh.points[row].mean(axis=0)
+    return points / np.abs(points).max(), faces
+
+
+def random_star(
+    random: np.random.Generator, d: int, spread: float = 0.3
+) -> tuple[NDArray[np.float64], NDArray[np.uint16]]:
+    """A closed star: the hull of points on a sphere, then moved; with a large spread it is tangled."""
+    from scipy.spatial import ConvexHull
+
+    directions = random.standard_normal((int(random.integers(d + 2, 16)), d))
+    points = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    hull = ConvexHull(points)
+    faces = hull.simplices.copy()
+    inward = np.linalg.det(points[faces]) < 0
+    faces[inward] = faces[inward][:, [1, 0, *range(2, d)]]
+    moved = points * random.uniform(1 - spread, 1 + spread, (len(points), 1))
+    moved += spread * random.standard_normal(points.shape)
+    return np.ascontiguousarray(moved / np.abs(moved).max()), faces.astype(np.uint16)

@@ -1,0 +1,89 @@
+"""What the tests run in several processes: `mpiexec -n 3 python over_ranks.py CASE...`.
+
+Each case is solved by the processes and by one alone; the root prints its name, and whether the bits and the counts of
+the records are the same.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+sys.path += [str(Path(__file__).parents[2] / "sample_meshes"), str(Path(__file__).parent)]
+import generate
+from meshes import tangle
+
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.repair import Method
+from meshfix_cli.solve.perturb import Distance
+from meshfix_cli.solve.records import Outcome
+from meshfix_cli.workers.distributed import ROOT, Root, serve
+
+REACH = Distance(3.0, in_h=True)
+METHODS = {
+    "auto": Method(),
+    "best": Method(smooth="best"),
+    "bestofvalid": Method(smooth="best"),
+    "finished": Method(smooth="best"),
+    "US": Method("US", sweeps=5),
+    "CS": Method("CS"),
+    "LUS": Method("LUS"),
+    "LS": Method("LS", sweeps=2, smooth=0),
+    "FF": Method("FF"),
+    "onlyinvalid": Method(only_invalid=True),
+    "onlyinvalidFF": Method("FF", only_invalid=True),
+    "near": Method(max_move=REACH),
+    "nearFF": Method("FF", max_move=REACH),
+    "plane": Method(),
+    "planebest": Method(smooth="best"),
+    "small": Method(),
+}
+
+
+def mesh_of(case: str) -> Mesh:
+    """Return a mesh of 14 blocks; of "plane" 2-D, of FF and "small" of two or one."""
+    if case.startswith("plane"):
+        return tangle(Mesh.build(*generate.plate(0.035)))
+    if case == "small":
+        return tangle(Mesh.build(*generate.plate(0.18)))
+    if case.endswith("FF"):
+        return tangle(Mesh.build(*generate.bracket(0.18, 8)), 25, 2)
+    valid = Mesh.build(*generate.bracket(0.06, 10))
+    if case == "bestofvalid":
+        return valid
+    if case == "finished":  # nothing is left to be gained
+        return Method(smooth="best").solve(Method(smooth="best").solve(valid, np.inf, 2).after, np.inf, 2).after
+    return tangle(valid, 25, 1 if case == "onlyinvalid" else 2)
+
+
+def facts(outcome: Outcome) -> tuple[Any, ...]:
+    """Return what must be the same: the bits of all three meshes, which of them are one, and the records."""
+    meshes = outcome.before, outcome.untangled, outcome.after
+    same = tuple(a is b for a in meshes for b in meshes)
+    records = tuple(replace(record, seconds=0.0) for record in outcome.records)
+    return tuple(mesh.points.tobytes() for mesh in meshes), same, records
+
+
+def main(cases: list[str]) -> None:
+    """Run the cases."""
+    from mpi4py import MPI  # the tests read METHODS also where it is not installed
+
+    comm = MPI.COMM_WORLD
+    for case in cases:
+        method = METHODS[case]
+        if comm.rank != ROOT:
+            serve(comm, method, 1)
+            continue
+        root, mesh = Root(comm, method, 1), mesh_of(case)
+        reach = method.reach(mesh, 1)
+        found = facts(root.solve(mesh, reach))
+        root.dismiss(0)
+        print(case, found == facts(method.solve(mesh, reach, 2)), flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

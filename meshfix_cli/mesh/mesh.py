@@ -72,7 +72,18 @@ class Mesh:
         return self.points.shape[1]
 
     def with_points(self, points: NDArray[np.float64]) -> Mesh:
-        """Return the same mesh with other positions (n, d) float64; the array becomes read-only."""
+        """Return the same mesh with other positions.
+
+        Parameters
+        ----------
+        points : (n, d) float64
+            In model units; the array itself is kept where it is contiguous, and becomes read-only.
+
+        Raises
+        ------
+        ValueError
+            The array has another shape or type. Whether the coordinates are finite is not looked at.
+        """
         if points.shape != self.points.shape or points.dtype != np.float64:
             raise ValueError(f"points have the shape {points.shape}, and this mesh {self.points.shape}")
         return replace(self, points=read_only(np.ascontiguousarray(points)))
@@ -93,13 +104,20 @@ class Mesh:
         return np.take(values, self.topology.connectivity.vertices, axis=0)
 
     def check(self, threads: int = 1) -> tuple[int, float]:
-        """Return the number of inverted simplices and the smallest signed area or volume, in model units."""
+        """Count the inverted simplices: those whose determinant is not positive beyond rounding.
+
+        Returns
+        -------
+        inverted : int
+        smallest : float
+            The smallest signed area or volume of all simplices, in model units.
+        """
         points, simplices = self.along_curve(self.points), self.topology.connectivity.simplices
         inverted, smallest = kernels.check(points, simplices, threads)
         return len(inverted), smallest
 
     def stuck(self, threads: int = 1) -> NDArray[np.int32]:
-        """Return the rows of the connectivity's simplices that have no free vertex."""
+        """Return the rows (k,), in the order of the connectivity, of the simplices that have no free vertex."""
         return self.topology.connectivity.stuck(self.along_curve(self.movable), threads)
 
     def mean_edge_length(self, threads: int = 1) -> float:

@@ -20,6 +20,9 @@ _T = TypeVar("_T", bound=np.generic)
 class Topology:
     """Connectivity, computed once and shared by every position of the points.
 
+    Arrays of points (n, ...) and of simplices (m, ...) have the user's order, those of `connectivity` that of the
+    kernels; `of_vertices`, `of_rows` and `Mesh.along_curve` lead from one to the other.
+
     Attributes
     ----------
     n : int
@@ -29,8 +32,20 @@ class Topology:
     flipped : (m,) bool
         True where the user's numbering has the other orientation.
     connectivity : kernels.Connectivity
-        The same in the order in which the kernels work, which is near in memory where it is near in space:
-        `vertices` (k,) and `rows` (m,) are the numbers that its vertices and simplices have here.
+        The same in the order in which the kernels work, which is near in memory where it is near in space. Its arrays,
+        all int32 and read-only:
+
+        - `vertices` (k,), `rows` (m,): the numbers that its vertices and simplices have here; all others are its own.
+        - `simplices` (m, d+1): positively oriented. A corner is the number simplex * (d+1) + position, and also names
+          the facet opposite it.
+        - `mates` (m, d+1): the corner on the other side of each facet, -1 on the boundary.
+        - `component` (m,): simplices that are joined through facets have the same number.
+        - `offsets` (k+1,), `corners`: the corners at each vertex, one vertex behind the other.
+        - `neighbour_offsets` (k+1,), `neighbours`: the vertices that share an edge with each.
+        - `colour_offsets`, `colour_blocks`: blocks of a colour share no edge; block b has the vertices from
+          b * `kernels.BLOCK_SIZE` on.
+
+        The last two lines are empty until `stars` has been called.
     """
 
     n: int
@@ -54,7 +69,13 @@ class Topology:
         return SIMPLICES[self.dimension]
 
     def stars(self, threads: int = 1) -> kernels.Connectivity:
-        """Return the connectivity with neighbours, faces and colours of blocks, made when they are first needed."""
+        """Return the connectivity with neighbours, faces and colours of blocks, made when they are first needed.
+
+        Raises
+        ------
+        InvalidMeshError
+            A vertex has more than 65,535 neighbours, or the mesh more corners than 32 bits can number.
+        """
         try:
             self.connectivity.build_stars(threads)
         except ValueError as error:  # a star, or the mesh, is too large to be numbered
@@ -117,14 +138,35 @@ class Topology:
         return self.flipped != self.mirrored
 
     def interface(self, regions: ArrayLike) -> NDArray[np.bool_]:
-        """(n,) bool: vertices of facets between simplices of different regions; `regions` (m,) labels."""
+        """Mark the vertices of facets between simplices of different regions.
+
+        Parameters
+        ----------
+        regions : (m,) array
+            Labels of any kind that can be compared.
+
+        Returns
+        -------
+        (n,) bool
+        """
         mesh = self.connectivity
         labels = np.asarray(regions)[mesh.rows]
         across = labels[mesh.mates // (self.dimension + 1)]
         return self._mark_facets((mesh.mates >= 0) & (across != labels[:, None]))
 
     def grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
-        """(n,) bool: these vertices and `rings` rings of neighbours around them."""
+        """Mark vertices and rings of neighbours around them.
+
+        Parameters
+        ----------
+        vertices : (n,) bool
+        rings : int
+            0: these vertices alone.
+
+        Returns
+        -------
+        (n,) bool
+        """
         return vertices | self.of_vertices(
             self.connectivity.grown(vertices[self.connectivity.vertices], rings).view(bool)
         )

@@ -35,6 +35,16 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     """Find inverted simplices without a free vertex, and fixed facets that cross each other.
 
     Facets that only touch, as at a slit, do not cross; nor do those of separate parts, which may be in contact.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    threads : int
+
+    Returns
+    -------
+    Obstacles
+        Each simplex, and each pair, once and in ascending order: the same for any number of threads.
     """
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     rows = mesh.stuck(threads)

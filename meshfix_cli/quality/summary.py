@@ -108,7 +108,18 @@ def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: in
 
 
 def distances(before: Mesh, after: Mesh) -> Array:
-    """Return how far each vertex moved (n,), in model units; 0 for points that belong to no element."""
+    """Measure how far each vertex moved.
+
+    Parameters
+    ----------
+    before, after : Mesh
+        Of one topology.
+
+    Returns
+    -------
+    (n,) float64
+        In model units; 0 for points that belong to no element.
+    """
     used = before.topology.used
     moved = np.zeros(len(used))
     moved[used] = np.linalg.norm(after.points[used] - before.points[used], axis=1)
@@ -116,14 +127,31 @@ def distances(before: Mesh, after: Mesh) -> Array:
 
 
 def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
-    """Return the mean over the vertices that moved and the largest distance, in model units, and their number."""
+    """Summarise `distances`.
+
+    Returns
+    -------
+    dict
+        "mean", over the vertices that moved, and "largest", in model units; "vertices": how many moved.
+    """
     far = distances(before, after)
     moved = far[far > 0]
     return {"mean": float(moved.mean()) if len(moved) else 0.0, "largest": float(far.max()), "vertices": len(moved)}
 
 
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
-    """Return the smallest angle among simplices with no free vertex: no method can raise it. None: there are none."""
+    """Find what no method can raise: the smallest angle among the simplices that have no free vertex.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    threads : int
+
+    Returns
+    -------
+    float or None
+        Degrees, dihedral for tetrahedra; None: each simplex has a free vertex.
+    """
     stuck = mesh.topology.connectivity.simplices[mesh.stuck(threads)]
     if len(stuck) == 0:
         return None

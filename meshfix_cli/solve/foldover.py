@@ -27,7 +27,15 @@ LAST_EPS = 1e-10  # where all determinants are positive already
 
 @dataclass(frozen=True, eq=False)
 class Reach:
-    """How far vertices may go: at most `distance` (model units) from where they were, `start` (n, d)."""
+    """How far vertices may go.
+
+    Attributes
+    ----------
+    start : (n, d) float64
+        Where they were.
+    distance : float
+        Model units; infinite: anywhere.
+    """
 
     start: Array
     distance: float = math.inf
@@ -65,7 +73,14 @@ def minimisations(
 
 
 def _embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_]) -> Array:
-    """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation (n, d)."""
+    """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
+
+    Returns
+    -------
+    (n, d) float64
+        In the plane valid wherever the boundary is convex. Source: W. T. Tutte, "How to draw a graph", Proceedings of
+        the London Mathematical Society 13 (1963).
+    """
     from scipy.sparse import csr_matrix, identity
     from scipy.sparse.linalg import cg
 
@@ -90,7 +105,19 @@ def _embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_]
 
 
 class _Region:
-    """The stars of the free vertices in coordinates of their own: the unit is the mean target size."""
+    """The stars of the free vertices.
+
+    Attributes
+    ----------
+    moving : (f,) int
+        The free vertices, in the numbers of the mesh.
+    vertices : (k,) int
+        These, then the others of the stars.
+    global_simplices : (s, d+1) int32
+        The simplices of the stars, in the numbers of the mesh.
+    energy : kernels.Foldover
+        The energy of these simplices, with the vertices numbered as in `vertices`.
+    """
 
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
         simplices = mesh.simplices[free[mesh.simplices].any(axis=1)]
@@ -105,14 +132,17 @@ class _Region:
         self.reach, self.threads = reach, threads
 
     def uniform(self, points: Array) -> Array:
-        """Return the same size for all: the region's signed measure, which its boundary fixes, in equal parts."""
+        """Return one target size for all (s,): the region's signed measure, which its boundary fixes, in equal parts.
+
+        A size is the d-th root of a measure, in model units.
+        """
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         # A region whose own boundary is turned inside out may have no measure, or a negative one.
         mean = max(measure.mean(), 1e-3 * np.abs(measure).mean())
         return np.full(len(measure), max(mean, np.finfo(float).tiny) ** (1 / points.shape[1]))
 
     def sizes(self, points: Array) -> Array:
-        """Return the sizes of the simplices at these positions."""
+        """Return the sizes (s,) that the simplices have at positions (n, d), none much smaller than the others."""
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         sizes = np.abs(measure) ** (1 / points.shape[1])
         return np.maximum(sizes, max(SMALLEST_TARGET * np.median(sizes), np.finfo(float).tiny))
@@ -151,7 +181,18 @@ class _Valid(Exception):
 
 
 class _Problem:
-    """The energy as a function of a vector x (free * d,); `least`: the smallest determinant where it was last asked."""
+    """The energy as a function of a vector x (f * d,): the free vertices in the coordinates of the region.
+
+    Attributes
+    ----------
+    origin : (d,) float64
+    unit : float
+        Positions are origin + unit * x in model units; the unit is the mean target size.
+    sizes : (s,) float64
+        Targets, in that unit.
+    least : float
+        The smallest determinant where the energy was last asked for.
+    """
 
     def __init__(self, region: _Region, points: Array, sizes: Array) -> None:
         self.region, self.all = region, points

@@ -42,7 +42,15 @@ class Team(Protocol):
         """Return the smallest of a value over all processes."""
 
     def ranked(self, values: Array, percent: float) -> float:
-        """Return the value that as many percent of all values (k,), all positive, are not above; k: of own things."""
+        """Return a percentile of the values of all processes, that below where it is between two.
+
+        Parameters
+        ----------
+        values : (k,) float64
+            Of the things that are this process's own; all positive.
+        percent : float
+            From 0 to 100.
+        """
 
     def shared(self, mask: Mask) -> Mask:
         """Return a mask (n,) with what the owners of its vertices say of them."""

@@ -159,7 +159,7 @@ class _Run:
         return self.input if self.points is self.first[0] else self.input.with_vertices(self.points)
 
     def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        """Yield the points after each sweep; the caller adds them before it asks for the next."""
+        """Yield the points (k, d) after each sweep; the caller adds them before it asks for the next."""
         self.changed[:] = False
         if not phase.moves:
             return self._minimisations(phase)
@@ -167,7 +167,10 @@ class _Run:
         return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
 
     def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
-        """Take the points of a sweep; return whether there was progress."""
+        """Take the points (k, d) of a sweep; return whether there was progress.
+
+        Progress is fewer inverted elements than ever in the run, or a smallest measure that is larger by `PROGRESS`.
+        """
         self.changed = kernels.moved(self.points, points, self.threads).view(bool)
         if self.only_invalid and not phase.moves:
             self.near = self.near | self.changed
@@ -311,7 +314,13 @@ def _minimisations(
 
 
 def collect(run: Iterator[tuple[Mesh, SweepRecord]], threads: int = 1) -> Outcome:
-    """Find what cannot be mended, then drain the generator of `steps`."""
+    """Find what cannot be mended, then drain the generator of `steps`.
+
+    Raises
+    ------
+    InvalidMeshError
+        See `Topology.stars`; raised by the first step.
+    """
     from meshfix_cli.quality.obstacles import find_obstacles
 
     first = next(run)

@@ -1,15 +1,11 @@
-"""The command line: click, and nothing else. Whatever is heavy to import is imported by its command."""
+"""The command line: click, and nothing else. A command is imported when it runs, and imports what is heavy itself."""
 
 from __future__ import annotations
 
 import click
 
 from meshfix_cli import __version__
-from meshfix_cli.cli.batch import batch
-from meshfix_cli.cli.perturb import perturb
-from meshfix_cli.cli.process import Group, cores
-from meshfix_cli.cli.quality import quality
-from meshfix_cli.cli.untangle import untangle
+from meshfix_cli.cli.process import Commands, Group, cores
 
 
 def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
@@ -27,7 +23,7 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
     ctx.exit()
 
 
-@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, commands=Commands(), context_settings={"help_option_names": ["-h", "--help"]})
 @click.option(
     "--version",
     is_flag=True,
@@ -44,7 +40,3 @@ def main() -> None:
     2 wrong usage, 3 inverted elements remain, the fixed boundary crosses itself or a --require is not met, 4 some of
     several meshes cannot be read or, in a batch, are not valid.
     """
-
-
-for command in (untangle, perturb, quality, batch):
-    main.add_command(command)

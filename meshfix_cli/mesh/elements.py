@@ -18,7 +18,7 @@ Rows = tuple[tuple[int, ...], ...]
 MEASURES = {1: "length", 2: "area", 3: "volume"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """What the types of one shape have in common, whatever their order.
 
@@ -62,7 +62,7 @@ class Shape:
         return "dihedral angle" if self.dimension == 3 else "angle"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Element:
     """A type of element.
 
@@ -160,18 +160,18 @@ ELEMENTS = {element.key: element for element in _TABLE}
 SIMPLICES = {element.shape.dimension: element for element in _TABLE if element.judged_by == "determinant"}
 
 # Types that are not in the table have a shape by their names: tetra35, VTK_LAGRANGE_WEDGE, penta_prism, ...
-_FAMILY = re.compile(
-    r"(?:VTK_[A-Z]+_)?(?P<solid>tetra|hexa|wedge|pyramid|penta|voxel|polyhedron)?(?P<flat>triangle|quad|polygon|pixel)?",
-    re.IGNORECASE,
-)
+_FAMILIES = {
+    3: ("tetra", "hexa", "wedge", "pyramid", "penta", "voxel", "polyhedron"),
+    2: ("triangle", "quad", "polygon", "pixel"),
+}
 
 
 def dimension_of(key: str) -> int:
     """Return the dimension of a type, by its name where it is not in the table; 0 where that tells nothing."""
     if key in ELEMENTS:
         return ELEMENTS[key].shape.dimension
-    family = _FAMILY.match(key)
-    return 0 if family is None else 3 if family["solid"] else 2 if family["flat"] else 0
+    name = re.sub("^vtk_[a-z]+_", "", key.lower())
+    return next((dimension for dimension, names in _FAMILIES.items() if name.startswith(names)), 0)
 
 
 def solved_among(keys: Iterable[str]) -> Element | None:

@@ -435,6 +435,8 @@ def test_wrong_usage_exits_2(arguments: list[str], tmp_path: Path) -> None:
 
 
 def test_help_of_every_command_names_every_option_and_strategy() -> None:
+    assert len(main.commands) == 4
+    assert "process" not in main.commands
     for name, command in main.commands.items():
         text = CliRunner().invoke(main, [name, "--help"]).output
         assert command.help

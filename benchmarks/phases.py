@@ -14,7 +14,7 @@ from typing import Any
 
 import rich.table  # noqa: F401 (the command does)
 
-import meshfix_cli.cli  # noqa: F401
+import meshfix_cli.cli.untangle  # noqa: F401
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.reading import read
 from meshfix_cli.meshfile.writing import write

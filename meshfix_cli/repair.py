@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Held:
-    """What is held still beside the boundary: names of arrays, see `meshfile.read`."""
+    """What is held still beside the boundary: names of arrays, see `reading.read`."""
 
     fix: str | None = None
     regions: str | None = None
 
     def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
-        """Read a mesh; the errors are those of `meshfile.read`."""
+        """Read a mesh; the errors are those of `reading.read`."""
         from meshfix_cli.meshfile.reading import read
 
         return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation, threads=threads)
@@ -95,7 +95,7 @@ class Files:
 
 @dataclass(frozen=True)
 class Method:
-    """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `untangle.plan`."""
+    """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `strategies.plan`."""
 
     strategy: str = "auto"
     sweeps: int | None = None
@@ -198,7 +198,7 @@ def repair(
     solve : callable
         (mesh, how far vertices may move in model units) -> Outcome; default: `method.solve`.
     put : callable
-        See `meshfile.write`.
+        See `writing.write`.
 
     Raises
     ------

@@ -10,6 +10,9 @@ import pytest
 
 from meshfix_cli.mesh.mesh import Mesh
 
+# Before they are imported: their assertions say what they compared.
+pytest.register_assert_rewrite("commands", "meshes", "programs", "splicing")
+
 # A shell starts what runs in the background with SIGINT ignored, which the programs that the tests start would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -24,7 +24,7 @@ from meshfix_cli.cli.options import (
     solving,
     storing,
 )
-from meshfix_cli.cli.process import SOME_FAILED, VALID, abort_all, complain, cores, find_processes, others
+from meshfix_cli.cli.process import SOME_FAILED, VALID, abort_all, complain, cores, find_processes, helpers
 from meshfix_cli.errors import WriteError
 from meshfix_cli.repair import Files, Held, Judge, Method
 
@@ -187,7 +187,7 @@ def batch(
     from meshfix_cli.report.facts import kept
     from meshfix_cli.workers.batch import Task, run
 
-    others.add("workers")
+    helpers.add("workers")
     with where.workers() as (executor, in_flight):
         if executor is None:
             return

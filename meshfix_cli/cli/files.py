@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from meshfix_cli.repair import Files, Held
-
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.meshfile.formats import Format
+    from meshfix_cli.repair import Files, Held
 
 
 def check_input(source: str) -> None:

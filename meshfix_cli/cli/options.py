@@ -164,8 +164,8 @@ def _options() -> dict[str, str]:
         if not isinstance(option, click.Option) or value is None or value is False or value == ():
             continue
         text = " ".join(map(str, value)) if isinstance(value, tuple) else "yes" if value is True else str(value)
-        given = context.get_parameter_source(option.name or "") is not ParameterSource.DEFAULT
-        values[option.opts[0]] = text if given else f"{text} (default)"
+        chosen = context.get_parameter_source(option.name or "") is not ParameterSource.DEFAULT
+        values[option.opts[0]] = text if chosen else f"{text} (default)"
     return values
 
 
@@ -178,8 +178,8 @@ def packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[...,
     def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
         @wraps(command)
         def with_one(**values: Any) -> Any:
-            given = [field.name for field in fields(kind) if field.name in values]
-            values[name] = kind(**{field: values.pop(field) for field in given})
+            mine = [field.name for field in fields(kind) if field.name in values]
+            values[name] = kind(**{field: values.pop(field) for field in mine})
             return command(**values)
 
         for option in reversed(options):

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import click
 
 from meshfix_cli.cli.files import open_files, report_stream
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, writing
 from meshfix_cli.repair import Files, Held
 from meshfix_cli.solve.perturb import Distance
-
-if TYPE_CHECKING:
-    pass
 
 
 @click.command()

@@ -15,12 +15,11 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from meshfix_cli.errors import MeshfixError
-from meshfix_cli.repair import Method
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
-    from meshfix_cli.repair import Steps
+    from meshfix_cli.repair import Method, Steps
     from meshfix_cli.workers.distributed import Root
 
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
@@ -31,7 +30,7 @@ LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_ST
 
 
 # Processes that work for this one, and end with it.
-others: set[str] = set()
+helpers: set[str] = set()
 
 
 class Commands(Mapping[str, click.Command]):
@@ -86,7 +85,7 @@ def _stop(number: int, frame: object) -> NoReturn:
     del frame
     signal.signal(number, signal.SIG_IGN)
     atomic = sys.modules.get("meshfix_cli.meshfile.atomic")
-    if others or getattr(atomic, "under_way", None):
+    if helpers or getattr(atomic, "under_way", None):
         sys.exit(128 + number)
     os._exit(128 + number)
 
@@ -115,7 +114,7 @@ def processes(method: Method, threads: int, watch: Callable[[Steps], Steps]) -> 
     from meshfix_cli.workers.distributed import ROOT, Root, serve
 
     comm = find_processes()
-    others.add("mpi")
+    helpers.add("mpi")
     if comm.rank != ROOT:
         try:
             code = serve(comm, method, threads)

@@ -22,6 +22,8 @@ MEASURES = {1: "length", 2: "area", 3: "volume"}
 class Shape:
     """What the types of one shape have in common, whatever their order.
 
+    Of those that are held only the words and the dimension are used yet.
+
     Attributes
     ----------
     name, plural : str
@@ -120,6 +122,8 @@ _HEXAHEDRON = Shape(
         (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
     ),
 )  # fmt: skip
+_PIXEL = Shape("pixel", "pixels", 2, 0)  # VTK's own order of a rectangle's and a box's corners
+_VOXEL = Shape("voxel", "voxels", 3, 0)
 _POLYGON = Shape("polygon", "polygons", 2, 0)
 _POLYHEDRON = Shape("polyhedron", "polyhedra", 3, 0)
 _TABLE = (
@@ -150,8 +154,8 @@ _TABLE = (
     Element("hexahedron27", _HEXAHEDRON, 27, vtk=29, gmsh=12),
     Element("triangle_strip", _POLYGON, 0, vtk=6),
     Element("polygon", _POLYGON, 0, vtk=7),
-    Element("pixel", _QUAD, 4, vtk=8),
-    Element("voxel", _HEXAHEDRON, 8, vtk=11),
+    Element("pixel", _PIXEL, 4, vtk=8),
+    Element("voxel", _VOXEL, 8, vtk=11),
     Element("polyhedron", _POLYHEDRON, 0, vtk=42),
 )
 ELEMENTS = {element.key: element for element in _TABLE}
@@ -163,6 +167,7 @@ SIMPLICES = {element.shape.dimension: element for element in _TABLE if element.j
 _FAMILIES = {
     3: ("tetra", "hexa", "wedge", "pyramid", "penta", "voxel", "polyhedron"),
     2: ("triangle", "quad", "polygon", "pixel"),
+    1: ("line", "poly_line", "curve"),
 }
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError
-from meshfix_cli.mesh.elements import SIMPLICES, Element, dimension_of, solved_among
+from meshfix_cli.mesh.elements import Element, dimension_of, solved_among
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
 from meshfix_cli.mesh.topology import Topology
 from meshfix_cli.meshfile.formats import Format
@@ -60,7 +60,8 @@ class Document:
     @property
     def simplices(self) -> NDArray[np.int64]:
         """(m, d+1) int64: the simplices of the mesh as the file numbers their vertices."""
-        return _all_simplices(self.source, self.mesh.dimension)[self.mesh.topology.source]
+        element = self.mesh.topology.element
+        return self.source.vertices_of(element.key, element.nodes)[self.mesh.topology.source]
 
     def outputs(self, target: str, form: Format) -> tuple[str, ...]:
         """Return the names of the files that an output in a format has; WriteError where it cannot be."""
@@ -117,9 +118,10 @@ class Document:
 
     def reversed_cells(self) -> dict[int, NDArray[np.int64]]:
         """Rows of the simplices, by the number of their run, whose numbering has the negative orientation."""
-        chosen = _runs_of_simplices(self.source, self.mesh.dimension)
+        element = self.mesh.topology.element
+        chosen = _runs_of(self.source, element)
         starts = np.cumsum([0, *(len(self.source.cells[run].vertices) for run in chosen)])
-        rows = np.flatnonzero(_reversed(_all_simplices(self.source, self.mesh.dimension), self.mesh.topology))
+        rows = np.flatnonzero(_reversed(self.source.vertices_of(element.key, element.nodes), self.mesh.topology))
         which = np.searchsorted(starts, rows, side="right") - 1
         found = {run: rows[which == i] - starts[i] for i, run in enumerate(chosen)}
         return {run: here for run, here in found.items() if len(here)}
@@ -132,8 +134,8 @@ def build(name: str, source: Source, form: Format, fix: str | None, regions: str
     if regions is not None:
         source = _with_regions(source, regions)
     starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
-    chosen = _runs_of_simplices(source, dimension)
-    simplices = _all_simplices(source, dimension)
+    chosen = _runs_of(source, element)
+    simplices = source.vertices_of(element.key, element.nodes)
     ids = np.concatenate([_ids(source.cells[i], int(starts[i])) for i in chosen])
 
     points, basis = _solved_points(source, simplices, dimension)
@@ -189,13 +191,8 @@ def _solved(source: Source) -> Element:
     raise ReadError(f"there are no tetrahedra and no plane mesh of triangles in it (cells: {found})")
 
 
-def _runs_of_simplices(source: Source, dimension: int) -> list[int]:
-    return [i for i, run in enumerate(source.cells) if run.type == SIMPLICES[dimension].key]
-
-
-def _all_simplices(source: Source, dimension: int) -> NDArray[np.int64]:
-    """(k, d+1), in the order of the file, repetitions included."""
-    return source.vertices_of(SIMPLICES[dimension].key, dimension + 1)
+def _runs_of(source: Source, element: Element) -> list[int]:
+    return [i for i, run in enumerate(source.cells) if run.type == element.key]
 
 
 def _ids(run: Cells, start: int) -> NDArray[np.int64]:

@@ -22,7 +22,7 @@ from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
 
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
-_COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.facets) & _KNOWN
+_COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _WITH_SETS = ("abaqus", "exodus")

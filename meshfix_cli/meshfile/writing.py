@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, WriteError
-from meshfix_cli.mesh.elements import SIMPLICES
+from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
@@ -77,7 +77,7 @@ def write(
     def produce(temporary: Path) -> None:
         nonlocal stored, dropped
         try:
-            held, dropped = _write_anew(temporary, source.merged(), points, form, mesh.dimension)
+            held, dropped = _write_anew(temporary, source.merged(), points, form, mesh.topology.element)
         except WriteError as error:
             raise WriteError(f"{target}: {error}") from error
         stored = document.in_plane(held, mesh)
@@ -124,7 +124,7 @@ def write_cells(
     )
 
     def produce(temporary: Path) -> None:
-        _write_anew(temporary, source, source.points, form, mesh.dimension)
+        _write_anew(temporary, source, source.points, form, mesh.topology.element)
 
     write_file(target, produce)
 
@@ -183,26 +183,26 @@ def _writable(form: Format, target: str) -> Format:
 
 
 def _write_anew(
-    path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format, dimension: int
+    path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format, element: Element
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Let meshio write, and read it again: return the points (n, d) as the file holds them, and what was dropped.
 
     Raises
     ------
     WriteError
-        The format cannot hold the simplices of this dimension, or rounds them too much.
+        The format cannot hold the elements of this type, or rounds them too much.
     """
     from meshfix_cli.meshfile import through_meshio
 
     through_meshio.write(path, source, points, form)
-    kind = SIMPLICES[dimension].key, dimension + 1
+    kind = element.key, element.nodes
     expected = source.vertices_of(*kind)
     held = points.astype(np.float64)
     size = float(np.ptp(held[expected], axis=(0, 1)).max())
     try:
         back = parse(path.read_bytes(), form, path)
         if not len(back.vertices_of(*kind)):
-            raise WriteError(f"cannot be written as {form.name}: that holds no {SIMPLICES[dimension].shape.plural}")
+            raise WriteError(f"cannot be written as {form.name}: that holds no {element.shape.plural}")
         corners = _spatial(back.points)[back.vertices_of(*kind)]
         difference = np.abs(corners - _spatial(held)[expected]).max()
         dropped = source.lost_in(back)

@@ -32,12 +32,12 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     (m,) float64
         Where nothing is left of a simplex, and the formula is 0 / 0, the worst value that there is.
     """
-    formula = globals()[name]  # METRICS has no other names
+    worst, formula = METRICS[name].worst, globals()[name]
     p = mesh.points[mesh.topology.simplices]
     measure = kernels.measure(mesh.points, mesh.topology.simplices, 1)[0]
     with np.errstate(divide="ignore", invalid="ignore"):
         values = formula(p[:, 1:] - p[:, :1], measure)
-    return np.where(np.isnan(values), 0.0 if METRICS[name].worst == "min" else np.inf, values)
+    return np.where(np.isnan(values), 0.0 if worst == "min" else np.inf, values)
 
 
 def worst_and_mean(name: str, mesh: Mesh) -> tuple[float, float]:

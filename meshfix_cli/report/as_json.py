@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from meshfix_cli import __version__
 from meshfix_cli.quality.summary import BIN_WIDTH, Summary
-from meshfix_cli.report.facts import Report, listed
+from meshfix_cli.report.facts import Report, first_inverted
 
 if TYPE_CHECKING:
     from meshfix_cli.solve.records import SweepRecord
@@ -34,7 +34,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "mirrored": int(mesh.topology.mirrored.sum()),
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
-        "first_inverted": [{"id": i, "centroid": c} for i, c in listed(report)],
+        "first_inverted": [{"id": i, "centroid": c} for i, c in first_inverted(report)],
         "inverted_without_free_vertex": len(report.obstacles.inverted),
         "obstacles": {
             "inverted": report.ids[report.obstacles.inverted].tolist(),

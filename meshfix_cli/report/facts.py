@@ -219,7 +219,7 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
             text += f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"
         lines.append(text)
     if count and listing:
-        lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in listed(report)]
+        lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in first_inverted(report)]
     lines += _impossible(report)
     if report.misnumbered:
         first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[: report.listed]].tolist()
@@ -261,7 +261,7 @@ def _perturbed(facts: Mapping[str, Any]) -> str:
     return f"moved {facts['moved']:,} vertices by {facts['distance']:.6g} (seed {facts['seed']})"
 
 
-def listed(report: Report) -> list[tuple[int, list[float]]]:
+def first_inverted(report: Report) -> list[tuple[int, list[float]]]:
     """Return the number of each inverted element that is listed, and its centroid in the coordinates of the file."""
     first = report.result.inverted_elements[: report.listed]
     if not len(first):

@@ -139,7 +139,7 @@ class Figures:
     Attributes
     ----------
     histograms : dict
-        Counts of smallest angles, in bins of `quality.BIN_WIDTH` degrees, of the first stage and of the last.
+        Counts of smallest angles, in bins of `summary.BIN_WIDTH` degrees, of the first stage and of the last.
     convergence : Convergence or None
         None: there were no sweeps.
     worst : list of Worst

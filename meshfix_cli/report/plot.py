@@ -45,7 +45,7 @@ def check_plot(target: str) -> None:
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
-        raise WriteError(f"{target}: plots need matplotlib: pip install 'meshfix-cli[plot]'") from error
+        raise WriteError(f"{target}: plots need matplotlib: pip install matplotlib") from error
     except Exception as error:  # settings of the user that it does not understand
         raise WriteError(f"{target}: matplotlib does not start: {error}") from error
 

@@ -45,8 +45,9 @@ class Phase:
     max_sweeps : int or None
         None: the limit of all untangling sweeps, `SWEEPS` where there is none.
     until : {"valid", "stalled", "settled", "ceiling"}
-        When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for `PATIENCE`
-        turns through the moves neither were there fewer inverted elements nor was the smallest measure larger;
+        When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for
+        `untangle.PATIENCE` turns through the moves neither were there fewer inverted elements nor was the smallest
+        measure larger;
         "settled": no vertex moved, which stops every phase; "ceiling": the smallest sine is that of the simplices
         without a free vertex, or does not rise any more. The last two are phases of smoothing.
     only_invalid : bool

@@ -1,21 +1,18 @@
-"""The processes that hold a mesh together, as the sweeps of `untangle.py` see them; here: one that has all of it.
-
-Light to import: `untangle.py` is.
-"""
+"""The processes that hold a mesh together, as the sweeps of `untangle.py` see them; here: one that has all of it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any, Protocol
 
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
+import numpy as np
+from numpy.typing import NDArray
 
+if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
 
-    Array = NDArray[np.float64]
-    Mask = NDArray[np.bool_]
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class Team(Protocol):
@@ -66,8 +63,6 @@ class Alone:
     """One process with the whole mesh; see `Team`."""
 
     def __init__(self, mesh: Mesh, threads: int) -> None:
-        import numpy as np
-
         self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
         self.own_vertices = np.ones(len(self.stars.vertices), dtype=bool)
         self.own_simplices = np.ones(len(self.stars.rows), dtype=bool)
@@ -82,8 +77,6 @@ class Alone:
 
     def ranked(self, values: Array, percent: float) -> float:
         """Return the value of a rank."""
-        import numpy as np
-
         rank = rank_of(len(values), percent)
         return float(np.partition(values, rank)[rank])
 

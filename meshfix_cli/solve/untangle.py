@@ -10,15 +10,15 @@ from functools import partial
 from itertools import chain, cycle, islice
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from meshfix_cli import kernels
 from meshfix_cli.solve.records import Outcome, SweepRecord
 from meshfix_cli.solve.strategies import SMOOTH, SMOOTHING, SWEEPS, THRESHOLD, Move, Phase, plan
 from meshfix_cli.solve.team import Alone
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.solve.team import Team
 
@@ -127,8 +127,6 @@ class _Run:
     def __init__(
         self, mesh: Mesh, threshold_sine2: float, max_move: float, only_invalid: bool, threads: int, team: Team
     ) -> None:
-        import numpy as np
-
         self.clock = time.perf_counter()
         self.input, self.threshold_sine2, self.threads, self.team = mesh, threshold_sine2, threads, team
         self.stars, self.max_move = mesh.topology.stars(threads), max_move
@@ -196,8 +194,6 @@ class _Run:
 
     def meets(self, degrees: float) -> bool:
         """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-        import numpy as np
-
         free = np.delete(self.stars.simplices, self.input.stuck(self.threads), axis=0)
         return self._least(kernels.angles(self.points, free, self.threads)[0]) >= math.radians(degrees)
 

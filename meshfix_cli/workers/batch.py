@@ -155,7 +155,7 @@ class Task:
         return replace(self, files=replace(self.files, source=source, target=target))
 
     def result(self, status: str, seconds: float, error: str | None = None, facts: Result | None = None) -> Result:
-        """Return the facts of `report.to_json`, if there are any, and what became of the file."""
+        """Return the facts of `as_json.to_json`, if there are any, and what became of the file."""
         names = {"command": "batch", "file": self.files.source, "output": self.files.target}
         return {"schema": SCHEMA, **(facts or {}), **names, "status": status, "seconds": seconds, "error": error}
 

@@ -99,7 +99,15 @@ def test_gmsh_knows_the_type_by_its_number(element: Element) -> None:
 
 
 def test_names_tell_the_dimension() -> None:
-    expected = {"tetra35": 3, "VTK_LAGRANGE_WEDGE": 3, "penta_prism": 3, "hexahedron64": 3, "quad16": 2, "line5": 0}
+    expected = {
+        "tetra35": 3,
+        "VTK_LAGRANGE_WEDGE": 3,
+        "penta_prism": 3,
+        "hexahedron64": 3,
+        "quad16": 2,
+        "line5": 1,
+        "vtk7": 0,
+    }
     assert {name: dimension_of(name) for name in expected} == expected
     assert dimension_of("polyhedron") == 3
     assert dimension_of("line") == 1

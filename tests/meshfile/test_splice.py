@@ -16,7 +16,8 @@ from splicing import FORMATS, MODULES, WORD, make, repaired, without_points
 
 from meshfix_cli import read, write
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.formats import sniff
+from meshfix_cli.meshfile import reading
+from meshfix_cli.meshfile.formats import Format, sniff
 
 TABLE = [(name, variant) for name, module in MODULES.items() for variant in module.FILES]
 
@@ -118,7 +119,7 @@ def test_the_orientation_is_mended_in_the_file(form: str, variant: str, tmp_path
     assert not read(path, fix_orientation=True).mesh.topology.flipped.any()
 
 
-@pytest.mark.parametrize("form", ["vtk", "vtu", "ply", "medit"])
+@pytest.mark.parametrize("form", [form for form in FORMATS if hasattr(reading._module(Format(form)), "promoted")])
 def test_single_precision_becomes_double(form: str, tmp_path: Path) -> None:
     paths = [make(form, variant, tmp_path) for variant in MODULES[form].FILES]
     single = [path for path in paths if read(path).source.points.dtype == np.float32]

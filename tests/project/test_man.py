@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from places import ROOT
 
-ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "man").glob("*.1"))
 
 
@@ -21,9 +21,11 @@ def test_pages_are_made_of_the_help(tmp_path: Path) -> None:
     subprocess.run(command, check=True, capture_output=True)
     assert [page.name for page in PAGES] == sorted(page.name for page in tmp_path.iterdir())
     for page in PAGES:
-        assert page.read_text() == (tmp_path / page.name).read_text(), "make man"
+        assert page.read_text() == (tmp_path / page.name).read_text(), "make man makes them again"
 
 
 def test_pages_are_installed_where_man_looks() -> None:
     for page in PAGES:
-        assert (Path(sys.prefix) / "share/man/man1" / page.name).read_text() == page.read_text()
+        assert (Path(sys.prefix) / "share/man/man1" / page.name).read_text() == page.read_text(), (
+            "make .venv/developer installs them"
+        )

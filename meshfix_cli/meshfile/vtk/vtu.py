@@ -99,7 +99,7 @@ class _Share(NamedTuple):
 
 
 class _Cells(NamedTuple):
-    """The cells of all pieces as `vtk_cells.runs` takes them, and the pieces of the connectivity."""
+    """The cells of all pieces as `cells.runs` takes them, and the pieces of the connectivity."""
 
     types: NDArray[np.int64]
     offsets: NDArray[np.int64]

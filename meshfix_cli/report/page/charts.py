@@ -23,7 +23,7 @@ def histogram(counts: Mapping[str, Sequence[int]], angle: str) -> str:
     Parameters
     ----------
     counts : mapping
-        Of each stage, in bins of `quality.BIN_WIDTH` degrees.
+        Of each stage, in bins of `summary.BIN_WIDTH` degrees.
     angle : str
         What they are the smallest of.
     """

@@ -16,6 +16,9 @@ from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import SMOOTH, plan
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.meshfile.formats import Format
@@ -26,21 +29,26 @@ if TYPE_CHECKING:
     from meshfix_cli.solve.records import Outcome, SweepRecord
     from meshfix_cli.solve.team import Team
 
+    Mask = NDArray[np.bool_]
     Steps = Iterator[tuple[Mesh, SweepRecord]]
 
 
 @dataclass(frozen=True)
 class Held:
-    """What is held still beside the boundary: names of arrays, see `reading.read`."""
+    """What is held still beside the boundary, and what is one point: see `reading.read`."""
 
     fix: str | None = None
     regions: str | None = None
+    join_points: bool = False
 
     def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
         """Read a mesh; the errors are those of `reading.read`."""
         from meshfix_cli.meshfile.reading import read
 
-        return read(source, self.fix, self.regions, double=double, fix_orientation=fix_orientation, threads=threads)
+        return read(
+            source, self.fix, self.regions, double=double, fix_orientation=fix_orientation,
+            join_points=self.join_points, threads=threads,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -108,20 +116,30 @@ class Method:
         """Return how far vertices may move, in model units."""
         return math.inf if self.max_move is None else self.max_move.length(mesh, threads)
 
-    def steps(self, mesh: Mesh, reach: float, threads: int, team: Team | None = None) -> Steps:
+    def steps(
+        self,
+        mesh: Mesh,
+        reach: float,
+        threads: int,
+        hopeless: NDArray[np.bool_] | None = None,
+        team: Team | None = None,
+    ) -> Steps:
         """Run the phases, see `untangle.steps`."""
         from meshfix_cli.solve.untangle import steps
 
         return steps(
             mesh, plan(self.strategy, self.smooth), sweeps=self.sweeps, threshold=self.threshold, max_move=reach,
-            only_invalid=self.only_invalid, threads=threads, team=team,
+            only_invalid=self.only_invalid, hopeless=hopeless, threads=threads, team=team,
         )  # fmt: skip
 
     def solve(self, mesh: Mesh, reach: float, threads: int, watch: Callable[[Steps], Steps] = iter) -> Outcome:
         """Run them to the end; `watch` passes the steps through, to show them."""
-        from meshfix_cli.solve.untangle import collect
+        from meshfix_cli.quality.obstacles import find_obstacles
+        from meshfix_cli.solve.records import Outcome
+        from meshfix_cli.solve.untangle import drain
 
-        return collect(watch(self.steps(mesh, reach, threads)), threads)
+        obstacles = find_obstacles(mesh, threads)
+        return Outcome(*drain(watch(self.steps(mesh, reach, threads, obstacles.hopeless(mesh)))), obstacles)
 
 
 @dataclass(frozen=True)
@@ -171,6 +189,7 @@ class Judge:
             ceiling=None if self.brief else ceiling(result, self.threads),
             obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
             fixed=document.fixed,
+            not_judged=document.not_judged,
             notes=(*document.notes, *notes),
             requirements=self.requirements,
             **more,
@@ -225,11 +244,12 @@ def repair(
 
 def _what_happened(document: Document, method: Method, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
     """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded."""
+    nothing = "no element that is judged" if document.not_judged else "no element"
     if outcome.after is outcome.before and outcome.valid:
         if len(outcome.records) > 1:
-            return ("no element is inverted and no angle could be made better: nothing was moved",)
+            return (f"{nothing} is inverted and no angle could be made better: nothing was moved",)
         asked = " and no angle is below what --threshold asks for" * bool(method.smooth and not method.only_invalid)
-        return (f"no element is inverted{asked}: nothing was moved",)
+        return (f"{nothing} is inverted{asked}: nothing was moved",)
     if outcome.records[-1].inverted or not rounded:
         return ()
     kind = document.source.points.dtype.name

@@ -194,6 +194,7 @@ holding = packed(
     Held,
     click.option("--fix", metavar="NAME", help="Hold the vertices where this point-data array is not zero."),
     click.option("--regions", metavar="NAME", help="Hold the interfaces between the regions of this cell-data array."),
+    click.option("--join-points", is_flag=True, help="Treat points of exactly equal coordinates as one; write each."),
 )
 _SHOW = (
     click.option("--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),

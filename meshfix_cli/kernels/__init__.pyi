@@ -37,6 +37,9 @@ class Connectivity:
     def stuck(self, movable: NDArray[np.bool_], threads: int) -> Int32:
         """Simplices without a movable vertex."""
 
+    def boundary(self) -> NDArray[np.uint8]:
+        """1 for the vertices (k,) of facets that belong to one simplex."""
+
     def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32]:
         """Facets (f, d) without a movable vertex, each once, and a simplex of each."""
 
@@ -122,6 +125,9 @@ def relocate(
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
+def exclusive(points: Float64, mesh: Connectivity, movable: NDArray[np.bool_], vertices: Int32, threads: int) -> Int32:
+    """Simplices of which some of these vertices are the only free ones, and no position makes all of them positive."""
+
 def receive(
     points: Float64, states: NDArray[np.uint8], mesh: Connectivity, vertices: Int32, positions: Float64
 ) -> None:
@@ -137,6 +143,12 @@ def linear_program(
 
 def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
     """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
+
+def enclosing(points: Float64, facets: Int32, parts: Int32, places: Float64, own: Int32, threads: int) -> Int32:
+    """For each place (q, d) that is inside its own part (q,) another that it is inside of; -1: there is none.
+
+    Oriented facets (f, d) close around a part; `parts` (f,) are those of the facets.
+    """
 
 class Foldover:
     """The foldover-free energy of simplices and its gradient; see moves/foldover.hpp."""

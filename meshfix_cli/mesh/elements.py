@@ -124,6 +124,7 @@ _HEXAHEDRON = Shape(
 )  # fmt: skip
 _PIXEL = Shape("pixel", "pixels", 2, 0)  # VTK's own order of a rectangle's and a box's corners
 _VOXEL = Shape("voxel", "voxels", 3, 0)
+_STRIP = Shape("strip of triangles", "strips of triangles", 2, 0)
 _POLYGON = Shape("polygon", "polygons", 2, 0)
 _POLYHEDRON = Shape("polyhedron", "polyhedra", 3, 0)
 _TABLE = (
@@ -152,7 +153,7 @@ _TABLE = (
     Element("hexahedron20", _HEXAHEDRON, 20, vtk=25, gmsh=17),
     Element("hexahedron24", _HEXAHEDRON, 24, vtk=33),
     Element("hexahedron27", _HEXAHEDRON, 27, vtk=29, gmsh=12),
-    Element("triangle_strip", _POLYGON, 0, vtk=6),
+    Element("triangle_strip", _STRIP, 0, vtk=6),
     Element("polygon", _POLYGON, 0, vtk=7),
     Element("pixel", _PIXEL, 4, vtk=8),
     Element("voxel", _VOXEL, 8, vtk=11),
@@ -184,3 +185,17 @@ def solved_among(keys: Iterable[str]) -> Element | None:
     found = set(keys)
     present = [element for element in SIMPLICES.values() if element.key in found]
     return max(present, key=lambda element: element.shape.dimension, default=None)
+
+
+def words(key: str) -> tuple[str, str]:
+    """Return what one element, and what several, of a type are called."""
+    if key not in ELEMENTS:
+        return f"{key} element", f"{key} elements"
+    element = ELEMENTS[key]
+    order = "" if element.linear or not element.shape.corners else f" of {element.nodes} nodes"
+    return f"{element.shape.name}{order}", f"{element.shape.plural}{order}"
+
+
+def counted(number: int, singular: str, plural: str) -> str:
+    """Return a number with the word for what it counts."""
+    return f"{number:,} {singular if number == 1 else plural}"

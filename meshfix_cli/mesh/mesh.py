@@ -30,11 +30,14 @@ class Mesh:
     topology : Topology
     movable : (n,) bool
         The free vertices.
+    apart : bool
+        Separate parts have coordinates of their own: that they overlap means nothing.
     """
 
     points: NDArray[np.float64]
     topology: Topology
     movable: NDArray[np.bool_]
+    apart: bool = False
 
     @classmethod
     def build(cls, points: ArrayLike, simplices: ArrayLike, fixed: ArrayLike | None = None, threads: int = 1) -> Mesh:

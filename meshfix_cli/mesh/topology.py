@@ -116,7 +116,7 @@ class Topology:
     @cached_property
     def boundary(self) -> NDArray[np.bool_]:
         """(n,) bool: vertices of facets that belong to one simplex."""
-        return self._mark_facets(self.connectivity.mates < 0)
+        return self.of_vertices(self.connectivity.boundary().view(bool))
 
     @cached_property
     def mirrored(self) -> NDArray[np.bool_]:
@@ -235,9 +235,7 @@ def build_topology(
     if not mesh.orientable:
         raise InvalidMeshError(f"the {shape.plural} form a Moebius band: no numbering makes all of them positive")
     flipped = mesh.against.astype(bool)
-    # The signed size of a consistently numbered component depends on its boundary alone, so it tells a mesh that
-    # is numbered the other way round from one whose interior is tangled.
-    measure = kernels.measure(np.take(points, mesh.vertices, axis=0), mesh.simplices, threads)[0]
+    measure = kernels.measure(_drawn_to_the_boundary(points, mesh), mesh.simplices, threads)[0]
     np.negative(measure, out=measure, where=flipped)
     flipped ^= (np.bincount(mesh.component, weights=measure) < 0)[mesh.component]
     if flipped.any():
@@ -245,3 +243,29 @@ def build_topology(
     rows = np.empty_like(flipped)
     rows[mesh.rows] = flipped
     return Topology(n, source, rows, mesh)
+
+
+def _drawn_to_the_boundary(points: NDArray[np.float64], mesh: kernels.Connectivity) -> NDArray[np.float64]:
+    """Return positions (k, d) of the connectivity's vertices with each inner one on a boundary vertex of its component.
+
+    The signed size of a consistently numbered component depends on its boundary alone, so it tells a mesh that is
+    numbered the other way round from one whose interior is tangled. Where inner vertices are must not matter: one that
+    is far away would drown the sum in rounding.
+    """
+    corners, boundary = np.take(points, mesh.vertices, axis=0), mesh.boundary().view(bool)
+    inner = np.flatnonzero(~boundary)
+    if not len(inner) or not boundary.any():
+        return corners
+    if not mesh.component.any():
+        corners[inner] = corners[np.argmax(boundary)]
+        return corners
+    at_boundary = boundary[mesh.simplices]
+    rows = np.flatnonzero(at_boundary.any(axis=1))
+    parts, first = np.unique(mesh.component[rows], return_index=True)
+    anchor = np.zeros(mesh.component.max() + 1, dtype=np.int32)  # of a component without a boundary, whose size is zero
+    anchor[parts] = mesh.simplices[rows[first], at_boundary[rows[first]].argmax(axis=1)]
+    of_vertex = np.empty(len(corners), dtype=np.int32)
+    for position in range(mesh.simplices.shape[1]):
+        of_vertex[mesh.simplices[:, position]] = mesh.component
+    corners[inner] = corners[anchor[of_vertex[inner]]]
+    return corners

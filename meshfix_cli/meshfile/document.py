@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError
-from meshfix_cli.mesh.elements import Element, dimension_of, solved_among
+from meshfix_cli.mesh.elements import Element, counted, dimension_of, solved_among
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
 from meshfix_cli.mesh.topology import Topology
+from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.source import Cells, Source
@@ -35,11 +36,15 @@ class Document:
         among all cells of the file, from 0.
     fixed : dict
         Number of vertices held for each reason; a vertex counts for the first that applies.
+    not_judged : dict
+        Number of elements of each type that are of the mesh's dimension, held, and not judged.
     notes : tuple of str
         What a user should know about the file, a sentence each.
     source : Source
     basis : (2, 3) float64 or None
         Spans the plane of a planar mesh in space.
+    copies : (n,) int64 or None
+        For each point the one that stands for it in the mesh, where points at one place are joined.
     """
 
     name: str
@@ -47,9 +52,11 @@ class Document:
     format: Format
     ids: NDArray[np.int64]
     fixed: dict[str, int]
+    not_judged: dict[str, int]
     notes: tuple[str, ...]
     source: Source = field(repr=False)
     basis: NDArray[np.float64] | None
+    copies: NDArray[np.int64] | None = None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -81,6 +88,9 @@ class Document:
             else:
                 points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
         points[moved] = self.source.rounded(points[moved])
+        if self.copies is not None:
+            behind = np.flatnonzero(moved[self.copies] & ~mesh.topology.used)
+            points[behind] = points[self.copies[behind]]
         return points
 
     def as_stored(self, mesh: Mesh) -> Mesh:
@@ -121,13 +131,21 @@ class Document:
         element = self.mesh.topology.element
         chosen = _runs_of(self.source, element)
         starts = np.cumsum([0, *(len(self.source.cells[run].vertices) for run in chosen)])
-        rows = np.flatnonzero(_reversed(self.source.vertices_of(element.key, element.nodes), self.mesh.topology))
+        rows = np.flatnonzero(_reversed(_simplices(self.source, element, self.copies), self.mesh.topology))
         which = np.searchsorted(starts, rows, side="right") - 1
         found = {run: rows[which == i] - starts[i] for i, run in enumerate(chosen)}
         return {run: here for run, here in found.items() if len(here)}
 
 
-def build(name: str, source: Source, form: Format, fix: str | None, regions: str | None, threads: int = 1) -> Document:
+def build(
+    name: str,
+    source: Source,
+    form: Format,
+    fix: str | None,
+    regions: str | None,
+    join_points: bool = False,
+    threads: int = 1,
+) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
     element = _solved(source)
     dimension = element.shape.dimension
@@ -135,16 +153,18 @@ def build(name: str, source: Source, form: Format, fix: str | None, regions: str
         source = _with_regions(source, regions)
     starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
     chosen = _runs_of(source, element)
-    simplices = source.vertices_of(element.key, element.nodes)
+    simplices = _simplices(source, element)
     ids = np.concatenate([_ids(source.cells[i], int(starts[i])) for i in chosen])
 
     points, basis = _solved_points(source, simplices, dimension)
+    copies = _copies(points, simplices) if join_points else None
+    simplices = _simplices(source, element, copies)
     held = {"on other cells of the file": _on_other_cells(source, chosen, len(points))}
     if source.held is not None:
         held["by the file"] = source.held
     if fix is not None:
         held[f"by --fix {fix}"] = _fixed_by(source, fix)
-    mesh = Mesh.build(points, simplices, threads=threads)
+    mesh = replace(Mesh.build(points, simplices, threads=threads), apart=source.apart)
     topology = mesh.topology
     reasons = {"on the boundary": topology.boundary}
     for key in source.regions:
@@ -153,21 +173,18 @@ def build(name: str, source: Source, form: Format, fix: str | None, regions: str
             raise ReadError(f"the cell data {key!r} are not labels of regions: they have {labels.shape[1]} components")
         reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, simplices, topology))
     fixed = {}
+    if copies is not None:
+        held = {reason: _of_copies(mask, copies) for reason, mask in held.items()}
     for reason, mask in {**reasons, **held}.items():
-        counted = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
-        fixed[reason] = int(counted.sum())
+        those = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
+        fixed[reason] = int(those.sum())
         mesh = mesh.with_fixed(mask)
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
     seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
-    notes = (*source.notes, *_notes(mesh, len(simplices), seen_from_above))
-    if dimension == 2 and any(run.type == "triangle_strip" for run in source.cells):
-        notes += ("strips of triangles are held where they are, and not judged",)
-    return Document(name, mesh, form, ids[topology.source], {k: v for k, v in fixed.items() if v}, notes, source, basis)
-
-
-def counted(number: int, singular: str, plural: str) -> str:
-    """Return a number with the word for what it counts."""
-    return f"{number:,} {singular if number == 1 else plural}"
+    notes = (*source.notes, *_notes(mesh, len(simplices), seen_from_above, copies))
+    fixed = {reason: count for reason, count in fixed.items() if count}
+    left = _not_judged(source, element)
+    return Document(name, mesh, form, ids[topology.source], fixed, left, notes, source, basis, copies)
 
 
 def with_reversed(source: Source, rows: Mapping[int, NDArray[np.int64]]) -> Source:
@@ -193,6 +210,34 @@ def _solved(source: Source) -> Element:
 
 def _runs_of(source: Source, element: Element) -> list[int]:
     return [i for i, run in enumerate(source.cells) if run.type == element.key]
+
+
+def _simplices(source: Source, element: Element, copies: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
+    """Return the simplices of the file (k, d+1), repetitions included."""
+    simplices = source.vertices_of(element.key, element.nodes)
+    return simplices if copies is None else copies[simplices]
+
+
+def _copies(points: NDArray[np.float64], simplices: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return for each point the first at its place that a simplex has; itself for what `Mesh.build` will refuse."""
+    used = np.unique(simplices)
+    return first_of_each_place(points, used[(used >= 0) & (used < len(points))])
+
+
+def _of_copies(mask: NDArray[np.bool_], copies: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Mark also the points that stand for marked ones."""
+    marked = mask.copy()
+    marked[copies[mask]] = True
+    return marked
+
+
+def _not_judged(source: Source, element: Element) -> dict[str, int]:
+    """Count the cells of the mesh's dimension that are not solved for; others are facets, lines and points."""
+    counts: dict[str, int] = {}
+    for run in source.cells:
+        if run.type != element.key and len(run.vertices) and dimension_of(run.type) == element.shape.dimension:
+            counts[run.type] = counts.get(run.type, 0) + len(run.vertices)
+    return counts
 
 
 def _ids(run: Cells, start: int) -> NDArray[np.int64]:
@@ -277,14 +322,21 @@ def _with_regions(source: Source, name: str) -> Source:
     return replace(source, regions=(name,), load=lambda: source.arrays)
 
 
-def _notes(mesh: Mesh, rows: int, seen_from_above: bool) -> tuple[str, ...]:
+def _notes(mesh: Mesh, rows: int, seen_from_above: bool, copies: NDArray[np.int64] | None) -> tuple[str, ...]:
     topology, shape = mesh.topology, mesh.topology.element.shape
     one, many = shape.name, shape.plural
     notes = []
     if topology.m < rows:
         repeated = counted(rows - topology.m, f"{one} is a repetition", f"{many} are repetitions")
         notes.append(f"{repeated} of another and not counted")
-    isolated = topology.n - int(topology.used.sum())
+    first = first_of_each_place(mesh.points, np.flatnonzero(topology.boundary)) if copies is None else copies
+    together, places = count(first)
+    if together and copies is None:
+        counts = f"{together:,} points lie at {counted(places, 'place', 'places')}"
+        notes.append(f"{counts} and are not joined; --join-points treats those of one place as one")
+    elif together:
+        notes.append(f"joined {together:,} points at {counted(places, 'place', 'places')}; each is written")
+    isolated = topology.n - int(topology.used.sum()) - (together - places if copies is not None else 0)
     if isolated:
         notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
     mirrored, which = int(topology.mirrored.sum()), ""

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, naming
 from meshfix_cli.kernels import use_threads
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile import formats
-from meshfix_cli.meshfile.document import Document, build, counted, with_reversed
+from meshfix_cli.meshfile.document import Document, build, with_reversed
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.pieces import join
 from meshfix_cli.meshfile.source import Family, Source
@@ -30,6 +31,7 @@ def read(
     *,
     double: bool = False,
     fix_orientation: bool = False,
+    join_points: bool = False,
     threads: int = 1,
 ) -> Document:
     """Read a triangle or tetrahedral mesh.
@@ -46,6 +48,8 @@ def read(
         Make coordinates in float32 those of a file in float64.
     fix_orientation : bool
         Renumber the simplices that have the negative orientation, by exchanging two of their vertices.
+    join_points : bool
+        Treat points of exactly equal coordinates as one while solving; each of them is written.
     threads : int
 
     Raises
@@ -60,12 +64,14 @@ def read(
     name = "<stdin>" if streamed else os.fspath(path)
     with naming(name):
         source, form = _open(None if streamed else Path(name), double, threads)
-        document = build(name, source, form, fix, regions, threads)
+        document = build(name, source, form, fix, regions, join_points, threads)
         rows = document.reversed_cells() if fix_orientation else {}
         if rows:
             shape = document.mesh.topology.element.shape
             note = f"renumbered {counted(sum(map(len, rows.values())), shape.name, shape.plural)}"
-            document = build(name, _with_reversed(document.source, rows, form, threads), form, fix, regions, threads)
+            document = build(
+                name, _with_reversed(document.source, rows, form, threads), form, fix, regions, join_points, threads
+            )
             document = replace(document, notes=(*document.notes, note))
         return document
 

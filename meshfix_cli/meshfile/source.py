@@ -163,6 +163,8 @@ class Source:
     numbers : callable
         Gives the numbers (n,) int64 of the points, by which pieces of a mesh tell which of them are the same; None:
         the file has none.
+    apart : bool
+        The parts of the mesh have coordinates of their own, in which they may lie over one another.
     pieces : Pieces or None
         What stands for the layout where the mesh lies in several files. With neither it can only be written anew.
     """
@@ -176,6 +178,7 @@ class Source:
     untold: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     numbers: Callable[[], NDArray[np.int64] | None] = lambda: None
+    apart: bool = False
     pieces: Pieces | None = None
 
     @property

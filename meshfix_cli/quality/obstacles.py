@@ -8,7 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import SIMPLICES
 from meshfix_cli.mesh.mesh import Mesh
+
+Array = NDArray[np.float64]
+
+# Depths below a facet, relative to the longest edges about, at which parts that share a place overlap.
+CONTACT = 0.3  # where facets cross; a chord of an eighth of a circle is a tenth of its length away from it
+TOUCHING = 1e-3  # elsewhere
+AS_LARGE = 0.4  # as what crosses: smaller simplices in contact may lie within a chord of larger ones
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,22 +27,44 @@ class Obstacles:
     ----------
     inverted : (k,) int32
         Inverted simplices without a free vertex.
+    exclusive : (e,) int32
+        Simplices that have one and the same free vertex with some others of these, and no position of it makes all of
+        them positive: the dual of the linear programme of section 2 certifies it.
     crossing : (c, 2) int32
         Pairs of simplices of one part that have fixed facets which cross each other: the part overlaps itself, even
         where all of its simplices are positive. Each facet's first 16 crossings are looked for.
+    overlapping : (o,) int32
+        Simplices at the boundary of a part, below which another part is as well.
     """
 
     inverted: NDArray[np.int32]
+    exclusive: NDArray[np.int32]
     crossing: NDArray[np.int32]
+    overlapping: NDArray[np.int32]
 
     def __bool__(self) -> bool:
-        return len(self.inverted) + len(self.crossing) > 0
+        return any(map(len, (self.inverted, self.exclusive, self.crossing, self.overlapping)))
+
+    def hopeless(self, mesh: Mesh) -> NDArray[np.bool_] | None:
+        """Mark simplices (m,), in the order of the connectivity, that may stay inverted whatever is done.
+
+        Those that are named here and, where facets cross, the neighbours of these. None: there are none.
+        """
+        if not self:
+            return None
+        named = np.zeros(mesh.topology.m, dtype=bool)
+        named[self.inverted] = named[self.exclusive] = True
+        around = np.zeros(mesh.topology.n, dtype=bool)
+        around[mesh.topology.simplices[self.crossing]] = True
+        named |= around[mesh.topology.simplices].any(axis=1)
+        return named[mesh.topology.connectivity.rows]
 
 
 def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
-    """Find inverted simplices without a free vertex, and fixed facets that cross each other.
+    """Find what makes a valid mesh impossible.
 
-    Facets that only touch, as at a slit, do not cross; nor do those of separate parts, which may be in contact.
+    Facets that only touch, as at a slit, do not cross. Separate parts may be in contact, and as their facets are flat
+    they may interpenetrate there a little.
 
     Parameters
     ----------
@@ -47,10 +77,78 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         Each simplex, and each pair, once and in ascending order: the same for any number of threads.
     """
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
-    rows = mesh.stuck(threads)
-    inverted, _ = kernels.check(points, connectivity.simplices[rows], threads)
-    facets, owners = connectivity.fixed_facets(mesh.along_curve(mesh.movable), threads)
+    movable = mesh.along_curve(mesh.movable)
+    inverted = kernels.check(points, connectivity.simplices, threads)[0]
+    free = movable[connectivity.simplices[inverted]].sum(axis=1)
+    facets, owners = connectivity.fixed_facets(movable, threads)
     pairs = owners[kernels.crossings(points, facets, threads)]
-    pairs = pairs[connectivity.component[pairs[:, 0]] == connectivity.component[pairs[:, 1]]]
-    named = np.sort(connectivity.rows[pairs], axis=1)
-    return Obstacles(np.sort(connectivity.rows[rows[inverted]]), np.unique(named, axis=0))
+    parts = connectivity.component[pairs]
+    within = parts[:, 0] == parts[:, 1]
+    rows, rigid = connectivity.rows, np.setdiff1d(mesh.stuck(threads), inverted)
+    return Obstacles(
+        np.sort(rows[inverted[free == 0]]),
+        np.unique(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
+        np.unique(np.sort(rows[pairs[within]], axis=1), axis=0),
+        np.sort(rows[_overlapping(mesh, points, pairs[~within], rigid, threads)]),
+    )
+
+
+def _exclusive(
+    mesh: Mesh, points: Array, movable: NDArray[np.bool_], inverted: NDArray[np.int32], threads: int
+) -> NDArray[np.int32]:
+    """Return rows of the connectivity; some of these inverted simplices, which have one free vertex, are among them."""
+    if not len(inverted):
+        return inverted
+    stars = mesh.topology.stars(threads)
+    corners = stars.simplices[inverted]
+    return kernels.exclusive(points, stars, movable, np.unique(corners[movable[corners]]), threads)
+
+
+def _overlapping(
+    mesh: Mesh,
+    points: Array,
+    crossing: NDArray[np.int32],
+    rigid: NDArray[np.int32],
+    threads: int,
+) -> NDArray[np.int32]:
+    """Return rows of the connectivity: simplices at places of their part that lie in another part as well.
+
+    Parameters
+    ----------
+    crossing : (c, 2) int32
+        Pairs of simplices of different parts with facets that cross. Below all facets of these parts is looked, as
+        deep as flat facets of that size may interpenetrate where curved parts are in contact, and at the centroids of
+        simplices that are as large. One facet speaks for a part that crosses no other.
+    rigid : (r,) int32
+        Valid simplices without a free vertex: the others may be anywhere.
+    """
+    connectivity = mesh.topology.connectivity
+    component = connectivity.component
+    if mesh.apart or not component.any():
+        return np.empty(0, dtype=np.int32)
+    rows, positions = np.nonzero(connectivity.mates < 0)
+    facets = connectivity.simplices[rows[:, None], np.array(SIMPLICES[points.shape[1]].shape.facets)[positions]]
+    corners, parts = points[facets], component[rows]
+    size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    largest = np.zeros(len(component))  # facet at the boundary, of each simplex
+    np.maximum.at(largest, rows, size)
+    length = np.zeros(component.max() + 1)  # of what crosses each part
+    np.maximum.at(length, component[crossing].ravel(), np.repeat(largest[crossing].max(axis=1, initial=0.0), 2))
+    below = np.where(length[parts] > 0, CONTACT * np.maximum(size, length[parts]), TOUCHING * size)
+    places = corners.mean(axis=1) - below[:, None] * _outward(corners)
+    asked = np.union1d(np.unique(parts, return_index=True)[1], np.flatnonzero(length[parts] > 0))
+    inner = rigid[(length[component[rigid]] > 0) & (largest[rigid] > AS_LARGE * length[component[rigid]])]
+    owners = np.concatenate([rows[asked], inner]).astype(np.int32)
+    places = np.concatenate([places[asked], points[connectivity.simplices[inner]].mean(axis=1)])
+    found = kernels.enclosing(points, facets, parts, places, component[owners], threads)
+    return np.unique(owners[found >= 0])
+
+
+def _outward(corners: Array) -> Array:
+    """Return unit normals (f, d) of facets (f, d, d)."""
+    edges = corners[:, 1:] - corners[:, :1]
+    if edges.shape[2] == 2:
+        normals = np.stack([edges[:, 0, 1], -edges[:, 0, 0]], axis=1)
+    else:
+        normals = np.cross(edges[:, 0], edges[:, 1])
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from meshfix_cli import __version__
@@ -30,6 +30,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "free_vertices": int(mesh.movable.sum()),
         "fixed": report.fixed,
         "valid": report.valid,
+        "not_judged": dict(report.not_judged),
         "misnumbered": report.misnumbered,
         "mirrored": int(mesh.topology.mirrored.sum()),
         "ceiling": report.ceiling,
@@ -37,8 +38,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "first_inverted": [{"id": i, "centroid": c} for i, c in first_inverted(report)],
         "inverted_without_free_vertex": len(report.obstacles.inverted),
         "obstacles": {
-            "inverted": report.ids[report.obstacles.inverted].tolist(),
-            "crossing": report.ids[report.obstacles.crossing].tolist(),
+            field.name: report.ids[getattr(report.obstacles, field.name)].tolist() for field in fields(report.obstacles)
         },
         "sweeps": [asdict(record) for record in report.records],
         "notes": list(report.notes),

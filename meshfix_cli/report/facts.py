@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.mesh.elements import counted, words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import Summary
@@ -47,6 +48,8 @@ class Report:
         What makes a valid mesh impossible.
     fixed : dict
         Number of fixed vertices by reason.
+    not_judged : dict
+        Number of elements that are held and not judged, by the name of their type.
     records : sequence of SweepRecord
     notes : sequence of str
     facts : dict
@@ -66,6 +69,7 @@ class Report:
     ceiling: float | None
     obstacles: Obstacles
     fixed: dict[str, int]
+    not_judged: Mapping[str, int]
     records: Sequence[SweepRecord] = ()
     notes: Sequence[str] = ()
     facts: Mapping[str, Any] | None = None
@@ -89,8 +93,8 @@ class Report:
 
     @property
     def valid(self) -> bool:
-        """No element is inverted, by shape or by numbering, and no fixed boundary crosses itself."""
-        return self.result.inverted == 0 and self.misnumbered == 0 and not self.obstacles
+        """All elements are judged, none is inverted, by shape or by numbering, and the mesh does not overlap itself."""
+        return not (self.result.inverted or self.misnumbered or self.obstacles or self.not_judged)
 
     @property
     def met(self) -> bool:
@@ -149,10 +153,11 @@ def kept(result: Mapping[str, Any]) -> dict[str, Any]:
 def title(report: Report) -> str:
     """Return what the mesh is, in one line."""
     mesh = report.mesh
-    cells, held = mesh.topology.element.shape.plural, ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
+    shape, held = mesh.topology.element.shape, ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
     vertices, free = int(mesh.topology.used.sum()), int(mesh.movable.sum())
-    return f"{report.name}: {mesh.topology.m:,} {cells}, {vertices:,} vertices: {free:,} free" + (
-        f", fixed {held}" if held else ""
+    return (
+        f"{report.name}: {counted(mesh.topology.m, shape.name, shape.plural)}, {vertices:,} vertices: {free:,} free"
+        + (f", fixed {held}" if held else "")
     )
 
 
@@ -212,6 +217,8 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
     count = report.result.inverted
     if report.valid:
         return [*lines, "valid: no element is inverted"]
+    if report.not_judged:
+        lines.append(f"NOT VALID: {not_judged(report)}")
     if count:
         verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
         text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
@@ -232,17 +239,36 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
 
 def _impossible(report: Report) -> Iterator[str]:
     """Name what no motion of the free vertices can mend."""
-    stuck, crossing = report.ids[report.obstacles.inverted], report.ids[report.obstacles.crossing]
-    some = slice(report.listed)
-    if len(stuck):
-        more = ", ..." if len(stuck[some]) < len(stuck) else ""
-        which = f"element{'s' * (len(stuck) > 1)} {', '.join(map(str, stuck[some].tolist()))}{more}"
-        yield f"IMPOSSIBLE: {len(stuck):,} of them without a free vertex: the fixed ones are wrong ({which})"
-    if len(crossing):
-        more = ", ..." if len(crossing[some]) < len(crossing) else ""
-        which = ", ".join(f"{a} and {b}" for a, b in crossing[some].tolist())
-        what = "place" if len(crossing) == 1 else "places"
-        yield f"IMPOSSIBLE: the fixed boundary crosses itself in {len(crossing):,} {what} (elements {which}{more})"
+    found = report.obstacles
+    if count := len(found.inverted):
+        which = _some(report, found.inverted)
+        yield f"IMPOSSIBLE: {count:,} of them without a free vertex: the fixed ones are wrong ({which})"
+    if count := len(found.exclusive):
+        yield (
+            f"IMPOSSIBLE: {count:,} elements exclude each other: wherever the free vertex that they share goes, one of "
+            f"them is inverted ({_some(report, found.exclusive)})"
+        )
+    if count := len(found.crossing):
+        pairs = report.ids[found.crossing[: report.listed]].tolist()
+        which = ", ".join(f"{a} and {b}" for a, b in pairs) + ", ..." * (len(pairs) < count)
+        places = counted(count, "place", "places")
+        yield f"IMPOSSIBLE: the fixed boundary crosses itself in {places} (elements {which})"
+    if len(found.overlapping):
+        yield f"IMPOSSIBLE: separate parts of the mesh overlap ({_some(report, found.overlapping)})"
+
+
+def _some(report: Report, rows: NDArray[np.int32]) -> str:
+    """Name the first of some elements as the file does."""
+    ids = report.ids[rows[: report.listed]].tolist()
+    return f"element{'s' * (len(rows) > 1)} {', '.join(map(str, ids))}{', ...' * (len(ids) < len(rows))}"
+
+
+def not_judged(report: Report) -> str:
+    """Say which elements are held and not judged: nothing, where all are judged."""
+    named = [counted(count, *words(key)) for key, count in report.not_judged.items()]
+    if not named:
+        return ""
+    return f"{' and '.join(named)} {'is' if sum(report.not_judged.values()) == 1 else 'are'} held and not judged"
 
 
 def required(report: Report) -> Iterator[tuple[bool, str]]:
@@ -254,11 +280,13 @@ def required(report: Report) -> Iterator[tuple[bool, str]]:
 
 def _displaced(facts: Mapping[str, Any]) -> str:
     far = facts["displacement"]
-    return f"moved {far['vertices']:,} vertices by {far['mean']:.3g} in the mean and {far['largest']:.3g} at most"
+    moved = counted(far["vertices"], "vertex", "vertices")
+    return f"moved {moved} by {far['mean']:.3g} in the mean and {far['largest']:.3g} at most"
 
 
 def _perturbed(facts: Mapping[str, Any]) -> str:
-    return f"moved {facts['moved']:,} vertices by {facts['distance']:.6g} (seed {facts['seed']})"
+    moved = counted(facts["moved"], "vertex", "vertices")
+    return f"moved {moved} by {facts['distance']:.6g} (seed {facts['seed']})"
 
 
 def first_inverted(report: Report) -> list[tuple[int, list[float]]]:

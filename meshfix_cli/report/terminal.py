@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from meshfix_cli.mesh.elements import MEASURES
+from meshfix_cli.mesh.elements import MEASURES, counted, words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.summary import BIN_WIDTH
 from meshfix_cli.report.as_json import to_json
@@ -145,6 +145,9 @@ def _result_line(result: Mapping[str, Any]) -> str:
         parts.append(f"{result['misnumbered']:,} numbered against the rest of the mesh")
     if result["obstacles"]["crossing"]:
         parts.append("the fixed boundary crosses itself")
+    if result["obstacles"]["overlapping"]:
+        parts.append("separate parts overlap")
+    parts += [f"{counted(count, *words(key))} not judged" for key, count in result["not_judged"].items()]
     return ", ".join([*parts, f"{result['seconds']:.3g} s"])
 
 

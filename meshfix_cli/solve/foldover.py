@@ -68,8 +68,7 @@ def minimisations(
     embedded = _embedding(points, mesh, free)
     sizes = region.sizes(embedded)
     yield from region.minimise(points, sizes)
-    if reach.distance == math.inf:
-        yield from region.minimise(embedded, sizes)
+    yield from region.minimise(embedded, sizes)  # its positions are drawn into reach
 
 
 def _embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_]) -> Array:

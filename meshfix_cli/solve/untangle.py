@@ -7,13 +7,14 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import chain, cycle, islice
+from itertools import cycle, islice
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.solve.records import Outcome, SweepRecord
 from meshfix_cli.solve.strategies import SMOOTH, SMOOTHING, SWEEPS, THRESHOLD, Move, Phase, plan
 from meshfix_cli.solve.team import Alone
@@ -41,6 +42,7 @@ def steps(
     threshold: float | None = None,
     max_move: float = math.inf,
     only_invalid: bool = False,
+    hopeless: NDArray[np.bool_] | None = None,
     threads: int = 1,
     team: Team | None = None,
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
@@ -63,6 +65,9 @@ def steps(
         No vertex goes farther from where it was, in model units.
     only_invalid : bool
         Move nothing but the stars of inverted elements and the rings around them, as many as it takes.
+    hopeless : (m,) bool, optional
+        Simplices, in the order of the connectivity, that may be inverted for good: see `Obstacles.hopeless`. They move
+        with the others, but nothing waits for them. Inverted simplices without a free vertex are always among them.
     threads : int
     team : Team, optional
         The processes of which each has a part of the mesh; the meshes are parts, the records are of the whole.
@@ -75,7 +80,7 @@ def steps(
     if not (0 <= degrees <= 90 and max_move >= 0):
         raise ValueError("the threshold must be from 0 to 90 degrees, and max_move not negative")
     team = Alone(mesh, threads) if team is None else team
-    run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, threads, team)
+    run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, hopeless, threads, team)
     yield run.mesh, run.record
     phases = tuple(phases)
     to_the_ceiling = any(phase.until == "ceiling" for phase in phases)
@@ -100,7 +105,8 @@ def steps(
                 break
             if len(phase.moves) == 1 and run.record.moved == 0:
                 break
-            if phase.until == "stalled" and waited == PATIENCE * len(phase.moves):
+            stalls = phase.until == "stalled" or (run.some_are_hopeless and not phase.moves)
+            if stalls and waited == PATIENCE * max(1, len(phase.moves)):
                 break
             run.clock = time.perf_counter()
     lost = run.record.rank > run.first[1].rank or (to_the_ceiling and run.first[1].inverted == 0 and not run.gained())
@@ -125,7 +131,14 @@ class _Run:
     """
 
     def __init__(
-        self, mesh: Mesh, threshold_sine2: float, max_move: float, only_invalid: bool, threads: int, team: Team
+        self,
+        mesh: Mesh,
+        threshold_sine2: float,
+        max_move: float,
+        only_invalid: bool,
+        hopeless: NDArray[np.bool_] | None,
+        threads: int,
+        team: Team,
     ) -> None:
         self.clock = time.perf_counter()
         self.input, self.threshold_sine2, self.threads, self.team = mesh, threshold_sine2, threads, team
@@ -135,12 +148,12 @@ class _Run:
         fixed = self.stars.simplices[stuck]
         inverted = kernels.check(self.points, fixed, threads)[0]
         self.stuck = np.delete(fixed, inverted, axis=0)
+        lost = stuck[inverted] if hopeless is None else np.union1d(stuck[inverted], np.flatnonzero(hopeless))
         self.mendable, self.own = self.stars.simplices, team.own_simplices
-        lost = int(self.own[stuck[inverted]].sum())
-        if len(inverted):
-            self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
-            self.own = np.delete(self.own, stuck[inverted])
-        self.beyond_repair = team.total(lost), team.least(kernels.check(self.points, fixed[inverted], threads)[1])
+        self.hopeless, self.own_hopeless = self.mendable[lost], self.own[lost]
+        if len(lost):
+            self.mendable, self.own = np.delete(self.mendable, lost, axis=0), np.delete(self.own, lost)
+        self.some_are_hopeless = team.total(len(lost)) > 0
         self.changed = np.zeros(len(self.points), dtype=bool)
         self._check()
         self.record = self._record("input", 0, 0)
@@ -213,16 +226,23 @@ class _Run:
         return True
 
     def _check(self) -> None:
-        """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure."""
+        """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure.
+
+        `lost` are the same two numbers of what is hopeless.
+        """
         self.inverted, smallest = kernels.check(self.points, self.mendable, self.threads)
         self.left = self.team.total(int(self.own[self.inverted].sum()))
         self.measure = self.team.least(smallest)
+        self.lost = 0, math.inf
+        if self.some_are_hopeless:
+            inverted, smallest = kernels.check(self.points, self.hopeless, self.threads)
+            self.lost = self.team.total(int(self.own_hopeless[inverted].sum())), self.team.least(smallest)
 
     def _rank(self) -> tuple[int, float]:
         return self.left, -self.measure
 
     def _record(self, phase: str, sweep: int, moved: int) -> SweepRecord:
-        inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
+        inverted, measure = self.left + self.lost[0], min(self.measure, self.lost[1])
         return SweepRecord(phase, sweep, inverted, measure, moved, time.perf_counter() - self.clock)
 
     def _broken(self) -> NDArray[np.bool_]:
@@ -309,21 +329,6 @@ def _minimisations(
             yield points
 
 
-def collect(run: Iterator[tuple[Mesh, SweepRecord]], threads: int = 1) -> Outcome:
-    """Find what cannot be mended, then drain the generator of `steps`.
-
-    Raises
-    ------
-    InvalidMeshError
-        See `Topology.stars`; raised by the first step.
-    """
-    from meshfix_cli.quality.obstacles import find_obstacles
-
-    first = next(run)
-    obstacles = find_obstacles(first[0], threads)
-    return Outcome(*drain(chain([first], run)), obstacles)
-
-
 def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tuple[SweepRecord, ...]]:
     """Take all steps; return the mesh as it came, untangled and smoothed, and the records."""
     run = iter(run)
@@ -380,8 +385,9 @@ def untangle(
     the best of those meshes cycles of LP sweeps on the stars that are still invalid; then FF, first in the smallest
     region that can be solved.
     """
+    phases, obstacles = plan(strategy, smooth), find_obstacles(mesh, threads)
     run = steps(
-        mesh, plan(strategy, smooth), sweeps=sweeps, threshold=threshold, max_move=max_move,
-        only_invalid=only_invalid, threads=threads,
+        mesh, phases, sweeps=sweeps, threshold=threshold, max_move=max_move, only_invalid=only_invalid,
+        hopeless=obstacles.hopeless(mesh), threads=threads,
     )  # fmt: skip
-    return collect(run, threads)
+    return Outcome(*drain(run), obstacles)

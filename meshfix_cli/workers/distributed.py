@@ -54,7 +54,7 @@ class Part:
     movable : (n,) bool
     simplices : (m, d+1) int32
         Those of the own vertices' stars, in the order of the whole, so that sums over a star have its order too.
-    own_simplices : (m,) bool
+    own_simplices, hopeless : (m,) bool
     owners, colours : (n - own,) int32
         Of the ghosts: the process that moves them and the colour of their block.
     block_colours : (own blocks,) int32
@@ -68,6 +68,7 @@ class Part:
     movable: Mask
     simplices: Numbers
     own_simplices: Mask
+    hopeless: Mask
     owners: Numbers
     colours: Numbers
     block_colours: Numbers
@@ -104,8 +105,9 @@ class Root:
         if self.comm.size > 1 and find_spec("pymetis") is None:
             raise MeshfixError("pymetis is not installed: pip install 'meshfix-cli[mpi]'")
         self._order("solve")
-        own, self.owned = None, []
-        for rank, part in enumerate(parts(mesh, self.comm.size, reach, self.threads)):
+        own, self.owned, obstacles = None, [], find_obstacles(mesh, self.threads)
+        hopeless = obstacles.hopeless(mesh)
+        for rank, part in enumerate(parts(mesh, self.comm.size, reach, self.threads, hopeless)):
             self.owned.append(mesh.topology.connectivity.vertices[part.vertices[: part.own]])
             if rank == ROOT:
                 own = part
@@ -115,7 +117,7 @@ class Root:
         before, untangled, after, records, ranks = _solved(self.comm, self.method, self.threads, own, mesh, self.watch)
         self.busy = False
         assert before is not None and untangled is not None and after is not None
-        return Outcome(before, untangled, after, records, find_obstacles(mesh, self.threads), ranks)
+        return Outcome(before, untangled, after, records, obstacles, ranks)
 
     def put(self, path: Path, places: Places, points: NDArray[np.floating[Any]], changed: Mask) -> None:
         """Write numbers (n, k) of a binary file where they changed (n, k), each process those of its vertices.
@@ -202,7 +204,7 @@ def _solved(
 ) -> tuple[Mesh | None, Mesh | None, Mesh | None, tuple[SweepRecord, ...], tuple[RankRecord, ...]]:
     """Solve one part; the root gets the whole mesh as it came, untangled and smoothed, the others None."""
     team = Ranks(comm, part, None if whole is None else whole.topology.stars(threads), threads)
-    *stages, records = drain(watch(method.steps(team.mesh, part.reach, threads, team)))
+    *stages, records = drain(watch(method.steps(team.mesh, part.reach, threads, part.hopeless, team)))
     known = {id(stages[0]): whole}
     for stage in stages:
         if id(stage) not in known:
@@ -213,7 +215,7 @@ def _solved(
     return before, untangled, after, records, tuple(ranks)
 
 
-def parts(mesh: Mesh, ranks: int, reach: float, threads: int) -> Iterator[Part]:
+def parts(mesh: Mesh, ranks: int, reach: float, threads: int, hopeless: Mask | None = None) -> Iterator[Part]:
     """Yield what each process holds; blocks are dealt out so that few edges go from one process to another."""
     stars = mesh.topology.stars(threads)
     points, movable = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
@@ -233,6 +235,7 @@ def parts(mesh: Mesh, ranks: int, reach: float, threads: int) -> Iterator[Part]:
         number[vertices] = np.arange(len(vertices), dtype=np.int32)
         yield Part(
             vertices, len(own), points[vertices], movable[vertices], number[simplices], owner[simplices[:, 0]] == rank,
+            np.zeros(len(rows), dtype=bool) if hopeless is None else hopeless[rows],
             owner[ghosts], colour[ghosts // kernels.BLOCK_SIZE], colour[blocks], reach,
         )  # fmt: skip
 

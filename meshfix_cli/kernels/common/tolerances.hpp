@@ -5,7 +5,7 @@
 
 namespace meshfix {
 
-// A simplex is valid if det > VALID * (longest edge)^d: ten times the rounding error of the determinant.
+// A simplex is valid if det > VALID * (product of the edges of the determinant): ten times its rounding error.
 constexpr double VALID = 1e-14;
 
 // Linear programme. All are relative to the largest number of their kind in the star.
@@ -14,6 +14,7 @@ constexpr double LP_RANK = 1e-9;            // residual below which the normals 
 constexpr double LP_PRICING = 1e-13;        // reduced cost that still counts as negative
 constexpr double LP_PIVOT = 1e-11;          // pivot element that still counts as positive
 constexpr double LP_BOX = 1.0;              // half width of the box that bounds the vertex, in star sizes
+constexpr double LP_IMPOSSIBLE = 1e-10;     // below minus this the smallest determinant is beyond doubt negative
 constexpr double LP_PINCHED_SINE2 = 3e-4;     // sine squared, of one degree: below it smoothing tries the programme
 constexpr double LP_AXIS2 = 0.1;            // squared length, of the largest, at which a neighbour may set an axis
 constexpr int LP_BLAND_AFTER = 20;          // plus one per face: pivots before Bland's rule

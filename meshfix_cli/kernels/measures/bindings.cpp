@@ -41,7 +41,7 @@ auto measure_py(const Matrix<const double>& points, const Matrix<const std::int3
                 const Edges<D> e = edges_of<D>(points.data(), simplices.data() + s * (D + 1));
                 const double det = determinant(e);
                 measure[s] = det / factorial(D);
-                valid[s] = is_valid<D>(e, det);
+                valid[s] = is_valid<D>(e, det, [&] { return corners_of<D>(points.data(), simplices.data() + s * (D + 1)); });
             }
         });
     });

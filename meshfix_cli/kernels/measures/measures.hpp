@@ -21,6 +21,13 @@ Edges<D> edges_of(const double* points, const std::int32_t* simplex) {
     return e;
 }
 
+template <int D>
+Corners<D> corners_of(const double* points, const std::int32_t* simplex) {
+    Corners<D> p;
+    for (int k = 0; k <= D; ++k) p[k] = load<D>(points + static_cast<std::int64_t>(simplex[k]) * D);
+    return p;
+}
+
 // Calls f(s, edges, range of angles) for the simplices from `begin` to `end`, LANES at a time, by acos where it is exact.
 template <int D, class F>
 void for_each_angles(const double* points, const std::int32_t* simplices, std::int64_t begin, std::int64_t end,
@@ -70,9 +77,9 @@ struct Validity {
 // What a sweep needs to know: nothing of it depends on the threads.
 template <int D>
 Validity check(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
-    const auto look = [](Validity& part, std::int64_t s, const Edges<D>& e) {
+    const auto look = [&](Validity& part, std::int64_t s, const Edges<D>& e) {
         const double det = determinant(e);
-        if (!is_valid<D>(e, det)) part.inverted.push_back(static_cast<std::int32_t>(s));
+        if (!is_valid<D>(e, det, [&] { return corners_of<D>(points, simplices + s * (D + 1)); })) part.inverted.push_back(static_cast<std::int32_t>(s));
         part.min_measure = std::min(part.min_measure, det);
     };
     Validity total;
@@ -90,8 +97,9 @@ double min_sine2(const double* points, const std::int32_t* simplices, std::int64
     struct Smallest {
         double sine2 = 1.0;
     };
-    const auto look = [](Smallest& part, std::int64_t, const Edges<D>& e) {
-        const double sine2 = min_sine2(e);
+    const auto look = [&](Smallest& part, std::int64_t s, const Edges<D>& e) {
+        double sine2 = min_sine2(e, true);
+        if (!(sine2 > 0.0)) sine2 = barely_min_sine2<D>(corners_of<D>(points, simplices + s * (D + 1)), 0.0);
         if (sine2 > 0.0) part.sine2 = std::min(part.sine2, sine2);
     };
     double smallest = 1.0;
@@ -123,7 +131,7 @@ Summary summarise(const double* points, const std::int32_t* simplices, const std
         part.histogram.resize(bins);
         for_each_angles<D>(points, simplices, begin, end, [&](std::int64_t s, const Edges<D>& e, AngleRange range) {
             const double det = determinant(e);
-            if (!is_valid<D>(e, det)) part.inverted.push_back(static_cast<std::int32_t>(s));
+            if (!is_valid<D>(e, det, [&] { return corners_of<D>(points, simplices + s * (D + 1)); })) part.inverted.push_back(static_cast<std::int32_t>(s));
             part.min_measure = std::min(part.min_measure, det / factorial(D));
             sign[s] = static_cast<std::int8_t>((det > 0.0) - (det < 0.0));
             total.smallest[s] = range.smallest;

@@ -11,16 +11,16 @@ namespace meshfix {
 
 constexpr int functions_per_simplex(int d) { return d == 2 ? 3 : 6; }
 
-// sign(det) * (smallest sine)^2 without square roots; -1 or NaN where the simplex is not valid.
+// (smallest sine)^2 without square roots; with `plain` -1 or NaN where the simplex is not plainly valid.
 template <class T>
-inline T min_sine2(const Edges<2, T>& e) {
+inline T min_sine2(const Edges<2, T>& e, bool plain) {
     const T det = determinant(e), a = norm2(e[0]), b = norm2(e[1]), ab = norm2(e[1] - e[0]);
     const T sine2 = det * det / larger(larger(a * b, a * ab), b * ab);
-    return select(is_valid<2>(det, larger(larger(a, b), ab)), sine2, constant<T>(-1.0));
+    return plain ? select(is_plainly_valid<2>(det, larger(larger(a, b), ab)), sine2, constant<T>(-1.0)) : sine2;
 }
 
 template <class T>
-inline T min_sine2(const Edges<3, T>& e) {
+inline T min_sine2(const Edges<3, T>& e, bool plain) {
     const Vec<3, T>&A = e[0], &B = e[1], &C = e[2];
     const Vec<3, T> AB = B - A, BC = C - B, CA = A - C;
     const Vec<3, T> normal_a = cross(B, C), normal_b = cross(C, A), normal_c = cross(A, B);
@@ -32,18 +32,27 @@ inline T min_sine2(const Edges<3, T>& e) {
     const T opposite = smaller(smaller(ab * na * nb, bc * nb * nc), ca * nc * na);
     const T sine2 = det * det * smaller(at_x, opposite) / (nx * na * nb * nc);
     const T longest = larger(larger(larger(a, b), larger(c, ab)), larger(bc, ca));
-    return select(is_valid<3>(det, longest), sine2, constant<T>(-1.0));
+    return plain ? select(is_plainly_valid<3>(det, longest), sine2, constant<T>(-1.0)) : sine2;
+}
+
+// The same of a simplex that a quick look does not tell to be valid; -1 where it is not. `unit` is that of `is_valid`.
+template <int D>
+inline double barely_min_sine2(const Corners<D>& p, double unit) {
+    double product = 0.0;
+    return is_barely_valid<D>(p, unit) ? min_sine2(sharpest_edges<D>(p, product), false) : -1.0;
 }
 
 // The smallest over the star at x; as soon as it is not above `floor` the rest is not looked at and -1 returned.
 template <int D>
 double min_sine2(const Star<D>& star, const Vec<D>& x, double floor) {
     double smallest = INFINITY;
-    for (const auto& block : star.blocks) {
-        const Pack lanes = min_sine2(star.edges(block, x));
+    for (std::size_t b = 0; b < star.blocks.size(); ++b) {
+        const Pack lanes = min_sine2(star.edges(star.blocks[b], x), true);
         for (int i = 0; i < LANES; ++i) {
-            if (!(lanes[i] > floor)) return -1.0;
-            smallest = std::min(smallest, lanes[i]);
+            double lane = lanes[i];
+            if (!(lane > 0.0) && star.valid_face(b, i, x)) lane = barely_min_sine2<D>(star.corners(star.face_of(b, i), x), 1.0);
+            if (!(lane > floor)) return -1.0;
+            smallest = std::min(smallest, lane);
         }
     }
     return smallest;

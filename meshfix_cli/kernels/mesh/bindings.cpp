@@ -23,11 +23,6 @@ auto rows_view(PyConnectivity& self) {
     return Matrix<const T>(values.data(), {values.size() / columns, columns}, nb::find(self));
 }
 
-const std::uint8_t* bytes_of(const Vector<const bool>& mask, std::int64_t expected) {
-    if (static_cast<std::int64_t>(mask.shape(0)) != expected) throw nb::value_error("the mask is of another mesh");
-    return reinterpret_cast<const std::uint8_t*>(mask.data());
-}
-
 void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
                        const Matrix<const std::int32_t>& simplices, const Vector<const std::int32_t>& used, int threads) {
     if (simplices.shape(1) != points.shape(1) + 1) throw nb::value_error("the simplices are of another dimension");
@@ -112,6 +107,11 @@ auto stuck_py(const PyConnectivity& self, const Vector<const bool>& movable, int
     }));
 }
 
+// Vertices of facets that belong to one simplex.
+auto boundary_py(const PyConnectivity& self) {
+    return to_numpy(with_dimension(self.dimension, [&](auto d) { return boundary_vertices<d>(self.mesh); }));
+}
+
 auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
     const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
     FixedFacets found = with_dimension(self.dimension, [&](auto d) {
@@ -157,6 +157,22 @@ auto crossings_py(const Matrix<const double>& points, const Matrix<const std::in
     return to_numpy(std::move(pairs), 2);
 }
 
+auto enclosing_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
+                  const Vector<const std::int32_t>& parts, const Matrix<const double>& places,
+                  const Vector<const std::int32_t>& own, int threads) {
+    const auto count = static_cast<std::int64_t>(facets.shape(0)), asked = static_cast<std::int64_t>(places.shape(0));
+    std::vector<std::int32_t> found(static_cast<std::size_t>(asked));
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const Crossings<D> tree(points.data(), facets.data(), count, threads);
+        for_each_range(asked, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t i = begin; i < end; ++i)
+                found[i] = tree.enclosing(load<D>(places.data() + i * D), own(i), parts.data());
+        });
+    });
+    return to_numpy(std::move(found));
+}
+
 // Where two arrays of points differ.
 auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after, int threads) {
     if (before.size() != after.size()) throw nb::value_error("the points are of two meshes");
@@ -176,6 +192,8 @@ void bind_mesh(nb::module_& m) {
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert(), "threads"_a);
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
+    m.def("enclosing", &enclosing_py, "points"_a.noconvert(), "facets"_a.noconvert(), "parts"_a.noconvert(),
+          "places"_a.noconvert(), "own"_a.noconvert(), "threads"_a);
     m.attr("BLOCK_SIZE") = BLOCK_SIZE;
 
     nb::class_<PyConnectivity>(m, "Connectivity")
@@ -188,6 +206,7 @@ void bind_mesh(nb::module_& m) {
         .def("build_stars", &build_stars_py, "threads"_a)
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
         .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)
+        .def("boundary", &boundary_py)
         .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a)
         .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })
         .def_prop_ro("orientable", [](PyConnectivity& self) { return self.mesh.orientable; })

@@ -73,10 +73,20 @@ class Crossings {
         return pairs;
     }
 
-   private:
-    static constexpr std::int64_t LEAF = 8, FACETS_PER_ITEM = 1024;
-    static constexpr int PARTS_AT = 5;  // depth in the tree
+    // In which part besides its own a place lies: one whose oriented facets close around it. -1: in none, or not in its own.
+    std::int32_t enclosing(const Vec<D>& place, std::int32_t own, const std::int32_t* parts) const {
+        std::vector<std::pair<std::int32_t, int>> turns;  // of each part that the ray meets
+        if (!order_.empty()) count_turns(0, 0, static_cast<std::int64_t>(order_.size()), place, parts, turns);
+        bool inside = false;
+        std::int32_t other = -1;
+        for (const auto& [part, turn] : turns) {
+            inside |= part == own && turn != 0;
+            if (part != own && turn != 0 && other < 0) other = part;
+        }
+        return inside ? other : -1;
+    }
 
+   private:
     struct Part {
         std::size_t node;
         std::int64_t begin, end;
@@ -101,6 +111,63 @@ class Crossings {
             return meets;
         }
     };
+
+    // A ray that no axis, diagonal or plane of a lattice is parallel to.
+    static constexpr std::array<double, 3> RAY{1.0, 0.003731934, 0.007392857};
+
+    bool ray_meets(const Box& box, const Vec<D>& place) const {
+        double near = 0.0, far = INFINITY;
+        for (int k = 0; k < D; ++k) {
+            near = std::max(near, (box.low[k] - place[k]) / RAY[k]);
+            far = std::min(far, (box.high[k] - place[k]) / RAY[k]);
+        }
+        return near <= far * (1.0 + 1e-12);
+    }
+
+    // +1 or -1 where the ray leaves or enters through a facet.
+    int turn_at(std::int32_t facet, const Vec<D>& place) const {
+        Vec<D> ray;
+        std::copy(RAY.begin(), RAY.begin() + D, ray.begin());
+        std::array<Vec<D>, D> p;
+        for (int k = 0; k < D; ++k) p[k] = vertex(facet, k) - place;
+        if constexpr (D == 2) {
+            const double first = meshfix::cross(ray, p[0]), second = meshfix::cross(ray, p[1]);
+            if ((first > 0.0) == (second > 0.0)) return 0;
+            const double ahead = meshfix::cross(p[0], p[1]);  // has the sign of second - first where the facet is ahead
+            return (ahead > 0.0) == (second > 0.0) ? (second > 0.0 ? 1 : -1) : 0;
+        } else {
+            const double a = dot(ray, meshfix::cross(p[0], p[1])), b = dot(ray, meshfix::cross(p[1], p[2]));
+            const double c = dot(ray, meshfix::cross(p[2], p[0]));
+            if ((a > 0.0) != (b > 0.0) || (b > 0.0) != (c > 0.0)) return 0;
+            const double ahead = dot(p[0], meshfix::cross(p[1], p[2]));
+            return (ahead > 0.0) == (a > 0.0) ? (a > 0.0 ? 1 : -1) : 0;
+        }
+    }
+
+    void count_turns(std::size_t node, std::int64_t begin, std::int64_t end, const Vec<D>& place, const std::int32_t* parts,
+                     std::vector<std::pair<std::int32_t, int>>& turns) const {
+        if (!ray_meets(boxes_[node], place)) return;
+        if (end - begin > LEAF) {
+            const std::int64_t middle = (begin + end) / 2;
+            count_turns(2 * node + 1, begin, middle, place, parts, turns);
+            count_turns(2 * node + 2, middle, end, place, parts, turns);
+            return;
+        }
+        for (std::int64_t i = begin; i < end; ++i) {
+            const int turn = ray_meets(leaves_[i], place) ? turn_at(order_[i], place) : 0;
+            if (turn == 0) continue;
+            const std::int32_t part = parts[order_[i]];
+            const auto known = std::find_if(turns.begin(), turns.end(), [&](const auto& one) { return one.first == part; });
+            if (known == turns.end()) {
+                turns.push_back({part, turn});
+            } else {
+                known->second += turn;
+            }
+        }
+    }
+
+    static constexpr std::int64_t LEAF = 8, FACETS_PER_ITEM = 1024;
+    static constexpr int PARTS_AT = 5;  // depth in the tree
 
     Vec<D> vertex(std::int32_t facet, int k) const {
         return load<D>(points_ + static_cast<std::int64_t>(facets_[static_cast<std::int64_t>(facet) * D + k]) * D);

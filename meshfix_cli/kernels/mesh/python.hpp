@@ -17,6 +17,11 @@ struct PyConnectivity {
     std::atomic<bool> has_stars{false};
 };
 
+inline const std::uint8_t* bytes_of(const Vector<const bool>& mask, std::int64_t expected) {
+    if (static_cast<std::int64_t>(mask.shape(0)) != expected) throw nb::value_error("the mask is of another mesh");
+    return reinterpret_cast<const std::uint8_t*>(mask.data());
+}
+
 template <class T>
 void check_points(const Matrix<T>& points, const PyConnectivity& self) {
     if (static_cast<int>(points.shape(1)) != self.dimension || static_cast<std::int64_t>(points.shape(0)) != self.mesh.n())

@@ -54,22 +54,6 @@ inline Vec<3, T> determinant_slope(const Edges<3, T>& e) {
     return cross(e[2] - e[0], e[1] - e[0]);
 }
 
-// The one validity predicate, for a star in its local frame and for the whole mesh. False for NaN.
-template <int D, class T>
-inline auto is_valid(T det, T longest2) {
-    const T measure2 = D == 2 ? longest2 * longest2 : longest2 * longest2 * longest2;
-    return (det > constant<T>(0.0)) & (det * det > constant<T>(VALID * VALID) * measure2);
-}
-
-// The same for one simplex. Where its edges from one vertex tell already, the others are not looked at: they are at
-// most twice as long.
-template <int D>
-inline bool is_valid(const Edges<D>& e, double det) {
-    double longest2 = norm2(e[0]);
-    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
-    return is_valid<D>(det, 4.0 * longest2) || is_valid<D>(det, longest_edge2<D>(e));
-}
-
 // Positions in a simplex of the face opposite corner k, ordered so that (k, face) is an even permutation:
 // det(face - x) is then the determinant of the simplex with x at corner k.
 template <int D>
@@ -81,6 +65,57 @@ inline const std::array<int, D>& opposite_face(int k) {
         static constexpr std::array<std::array<int, 3>, 4> faces{{{1, 2, 3}, {0, 3, 2}, {0, 1, 3}, {0, 2, 1}}};
         return faces[k];
     }
+}
+
+// Whether rounding leaves no doubt that a simplex is valid, from whichever vertex its determinant was taken.
+template <int D, class T>
+inline auto is_plainly_valid(T det, T longest2) {
+    const T measure2 = D == 2 ? longest2 * longest2 : longest2 * longest2 * longest2;
+    return (det > constant<T>(0.0)) & (det * det > constant<T>(VALID * VALID) * measure2);
+}
+
+template <int D>
+using Corners = std::array<Vec<D>, D + 1>;
+
+// The edges from the corner where the determinant is most exact: its rounding error is of the size of their product.
+template <int D>
+inline Edges<D> sharpest_edges(const Corners<D>& p, double& product) {
+    Edges<D> best{};
+    product = INFINITY;
+    for (int k = 0; k <= D; ++k) {
+        Edges<D> e;
+        double here = 1.0;
+        for (int i = 0; i < D; ++i) {
+            e[i] = p[opposite_face<D>(k)[i]] - p[k];
+            here *= std::sqrt(norm2(e[i]));
+        }
+        if (here < product) {
+            product = here;
+            best = e;
+        }
+    }
+    return best;
+}
+
+// Whether a simplex is valid of which a quick look does not tell. Its corners have rounding errors of the size of
+// `unit`: 0 for those of the mesh, whose differences are exact to the last bit.
+template <int D>
+inline bool is_barely_valid(const Corners<D>& p, double unit) {
+    double product = 0.0;
+    const Edges<D> e = sharpest_edges<D>(p, product);
+    double error = product;
+    for (const auto& edge : e) error += unit * product / std::sqrt(norm2(edge));
+    return determinant(e) > VALID * error;
+}
+
+// The one validity predicate, for a star in its local frame and for the whole mesh. False for NaN. `corners` gives the
+// corners, where the edges from one do not tell: the other edges are at most twice as long.
+template <int D, class F>
+inline bool is_valid(const Edges<D>& e, double det, const F& corners, double unit = 0.0) {
+    double longest2 = norm2(e[0]);
+    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
+    if (is_plainly_valid<D>(det, 4.0 * longest2)) return true;
+    return !is_plainly_valid<D>(-det, 4.0 * longest2) && is_barely_valid<D>(corners(), unit);
 }
 
 }  // namespace meshfix

@@ -107,14 +107,31 @@ struct Star {
     }
 
     bool valid(const Vec<D>& x) const {
-        for (const auto& block : blocks) {
-            const auto e = edges(block, x);
+        for (std::size_t b = 0; b < blocks.size(); ++b) {
+            const auto e = edges(blocks[b], x);
             const Pack ones = constant<Pack>(1.0);
-            const Pack valid = select(is_valid<D>(determinant(e), longest_edge2<D>(e)), ones, ones - 1.0);
+            const Pack plain = select(is_plainly_valid<D>(determinant(e), longest_edge2<D>(e)), ones, ones - 1.0);
             for (int i = 0; i < LANES; ++i)
-                if (valid[i] == 0.0) return false;
+                if (plain[i] == 0.0 && !valid_face(b, i, x)) return false;
         }
         return true;
+    }
+
+    // Whether the simplex in a lane of a block is valid.
+    bool valid_face(std::size_t block, int lane, const Vec<D>& x) const {
+        const int i = face_of(block, lane);
+        const Edges<D> e = edges(i, x);
+        return is_valid<D>(e, determinant(e), [&] { return corners(i, x); }, 1.0);
+    }
+    int face_of(std::size_t block, int lane) const {
+        return std::min(static_cast<int>(block) * LANES + lane, faces_count - 1);
+    }
+
+    // The simplex of face i: x, then the face.
+    Corners<D> corners(int i, const Vec<D>& x) const {
+        Corners<D> p{x};
+        for (int k = 0; k < D; ++k) p[k + 1] = neighbours[faces[i * D + k]];
+        return p;
     }
 };
 

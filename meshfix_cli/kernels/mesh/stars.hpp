@@ -33,6 +33,18 @@ struct Connectivity {
     std::int64_t blocks() const { return (n() + BLOCK_SIZE - 1) / BLOCK_SIZE; }
 };
 
+// 1 for the vertices (n) of facets that belong to one simplex.
+template <int D>
+std::vector<std::uint8_t> boundary_vertices(const Connectivity& mesh) {
+    std::vector<std::uint8_t> marked(static_cast<std::size_t>(mesh.n()), 0);
+    for (std::size_t corner = 0; corner < mesh.mates.size(); ++corner) {
+        if (mesh.mates[corner] >= 0) continue;
+        const std::int32_t* simplex = mesh.simplices.data() + corner / (D + 1) * (D + 1);
+        for (const int position : opposite_face<D>(static_cast<int>(corner % (D + 1)))) marked[simplex[position]] = 1;
+    }
+    return marked;
+}
+
 template <int D>
 Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
                      std::vector<std::int32_t> used, int threads) {

@@ -3,6 +3,7 @@
 
 #include "measures/python.hpp"
 #include "mesh/python.hpp"
+#include "moves/exclusive.hpp"
 #include "moves/foldover.hpp"
 #include "moves/relocate.hpp"
 
@@ -52,6 +53,17 @@ auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8
                            Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
     });
     return std::make_pair(counts.visited, counts.moved);
+}
+
+auto exclusive_py(const Matrix<const double>& points, const PyConnectivity& self, const Vector<const bool>& movable,
+                  const Vector<const std::int32_t>& vertices, int threads) {
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    check_points(points, self);
+    const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
+    return to_numpy(with_dimension(self.dimension, [&](auto d) {
+        return exclusive_simplices<d>(self.mesh, stars_of(self.mesh), points.data(), mask, vertices.data(),
+                                      static_cast<std::int64_t>(vertices.shape(0)), threads);
+    }));
 }
 
 // Vertices that others moved: where one is elsewhere, its neighbours are due again.
@@ -151,6 +163,8 @@ void bind_moves(nb::module_& m) {
           "threads"_a);
     m.def("receive", &receive_py, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a, "vertices"_a.noconvert(),
           "positions"_a.noconvert());
+    m.def("exclusive", &exclusive_py, "points"_a.noconvert(), "mesh"_a, "movable"_a.noconvert(), "vertices"_a.noconvert(),
+          "threads"_a);
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("mean_angle", &mean_angle_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());

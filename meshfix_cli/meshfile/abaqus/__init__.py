@@ -53,7 +53,8 @@ def parse(data: bytes) -> Source:
         "instances are not moved to their places in the assembly: coordinates are those of the parts",
     ) * deck.placed
     untold = ("numbers of nodes and elements", *deck.untold())
-    return Source(points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes)
+    apart = sum(1 for _ in deck.of("PART")) > 1
+    return Source(points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes, apart=apart)
 
 
 def _nodes(deck: Deck) -> tuple[Places, Labels]:

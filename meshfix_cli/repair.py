@@ -127,9 +127,10 @@ class Method:
         """Run the phases, see `untangle.steps`."""
         from meshfix_cli.solve.untangle import steps
 
+        phases = plan(self.strategy, self.smooth, self.only_invalid)
         return steps(
-            mesh, plan(self.strategy, self.smooth), sweeps=self.sweeps, threshold=self.threshold, max_move=reach,
-            only_invalid=self.only_invalid, hopeless=hopeless, threads=threads, team=team,
+            mesh, phases, sweeps=self.sweeps, threshold=self.threshold, max_move=reach, only_invalid=self.only_invalid,
+            hopeless=hopeless, threads=threads, team=team,
         )  # fmt: skip
 
     def solve(self, mesh: Mesh, reach: float, threads: int, watch: Callable[[Steps], Steps] = iter) -> Outcome:

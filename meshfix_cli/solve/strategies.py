@@ -5,6 +5,7 @@ Light to import: the command line reads `STRATEGIES` for its help.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Literal
@@ -16,6 +17,7 @@ THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrah
 SMOOTHING = "smoothing"
 RATIO_SWEEPS = 2  # of "best": later ones gain little
 ANGLE_SWEEPS = 3
+REGIONS = (0, 2, 4, 8, None)  # rings around inverted elements that sweeps take in, where only those may move
 
 
 class Move(IntEnum):
@@ -30,6 +32,7 @@ class Move(IntEnum):
     MEAN_RATIO = 6
     RAISE_SMALLEST = 7
     MEAN_ANGLE = 8
+    COME_BACK = 9
 
 
 @dataclass(frozen=True)
@@ -55,8 +58,8 @@ class Phase:
     from_best : bool
         Start from the best mesh met so far, that of the input included, not from the last.
     rings : tuple of (int or None)
-        The energy's regions, to be tried one after the other: so many rings around the inverted elements; None: the
-        whole mesh.
+        The regions, so many rings around the inverted elements; None: the whole mesh. Those of the energy are tried one
+        after the other; sweeps have one, which counts where only invalid elements may move.
     """
 
     name: str
@@ -76,6 +79,7 @@ class Phase:
 _LAPLACIAN = Phase("Laplacian", (Move.LAPLACIAN,))
 _LP = Phase("LP", (Move.UNTANGLE,))
 _LP_CYCLES = (*(Move.UNTANGLE_HEIGHTS,) * 3, Move.SMART_LAPLACIAN)
+_BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
 _FOLDOVER = Phase("FF", max_sweeps=120, from_best=True, rings=(None,))
 STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "auto": (
@@ -99,8 +103,11 @@ _BEST = (
 )
 
 
-def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH) -> tuple[Phase, ...]:
+def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH, only_invalid: bool = False) -> tuple[Phase, ...]:
     """Return the phases of a strategy and those of smoothing: so many passes, or the best that can be had.
+
+    With `only_invalid` the region of sweeps that stall grows; where nothing is smoothed, vertices that went farther
+    than validity takes come back.
 
     Raises
     ------
@@ -109,7 +116,22 @@ def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH) -> tuple[Phase, 
     """
     if smooth != "best" and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
         raise ValueError(f'smooth is {smooth!r}, and must be a number of passes or "best"')
+    untangling = STRATEGIES[strategy]
+    if only_invalid:
+        untangling = tuple(region for phase in untangling for region in _in_regions(phase))
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), SMOOTH, until="settled", from_best=True)
+    if only_invalid and smooth == 0:
+        return (*untangling, _BACK)
     if smooth == "best":
-        return (*STRATEGIES[strategy], passes, *_BEST)
-    return (*STRATEGIES[strategy], replace(passes, max_sweeps=smooth))
+        return (*untangling, passes, *_BEST)
+    return (*untangling, replace(passes, max_sweeps=smooth))
+
+
+def _in_regions(phase: Phase) -> Iterator[Phase]:
+    """Give a phase of sweeps that may stall once for each region."""
+    if not (phase.moves and phase.only_invalid):
+        yield phase
+        return
+    for rings in REGIONS:
+        name = phase.name if rings == 0 else f"{phase.name} and {'all' if rings is None else rings} rings"
+        yield replace(phase, name=name, rings=(rings,))

@@ -163,6 +163,7 @@ class _Run:
         self.near = self.free & self._broken() if only_invalid else self.free
         # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
+        self.floor = self.min_measure
 
     @property
     def mesh(self) -> Mesh:
@@ -174,6 +175,10 @@ class _Run:
         self.changed[:] = False
         if not phase.moves:
             return self._minimisations(phase)
+        if self.only_invalid and phase.rings:
+            rings = phase.rings[0]
+            self.near = self.free if rings is None else self._grown(self.near | self._broken(), rings)
+            self.fewest, self.largest = self.left, self.measure  # what a smaller region reached is no measure
         near = self._grown(self.near, NEAR) if self.only_invalid and phase.smooths else self.near
         return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
 
@@ -258,6 +263,7 @@ class _Run:
     def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
         near = near & self.team.own_vertices
         threshold, states = self._threshold_sine2(phase), _due(near)
+        self.floor = self.measure if Move.COME_BACK in phase.moves else self.min_measure
         for move in cycle(phase.moves):
             if len(phase.moves) > 1:  # what was visited by one move is due for the next
                 states = _due(near)
@@ -278,7 +284,7 @@ class _Run:
         points = self.points.copy()
         for blocks in self.team.sweep(points, states):
             kernels.relocate(
-                move, points, states, self.stars, blocks, threshold, self.min_measure, self.first[0], self.max_move,
+                move, points, states, self.stars, blocks, threshold, self.floor, self.first[0], self.max_move,
                 self.threads,
             )  # fmt: skip
         return points
@@ -385,7 +391,7 @@ def untangle(
     the best of those meshes cycles of LP sweeps on the stars that are still invalid; then FF, first in the smallest
     region that can be solved.
     """
-    phases, obstacles = plan(strategy, smooth), find_obstacles(mesh, threads)
+    phases, obstacles = plan(strategy, smooth, only_invalid), find_obstacles(mesh, threads)
     run = steps(
         mesh, phases, sweeps=sweeps, threshold=threshold, max_move=max_move, only_invalid=only_invalid,
         hopeless=obstacles.hopeless(mesh), threads=threads,

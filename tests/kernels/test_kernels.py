@@ -200,15 +200,15 @@ def relocate(
 ) -> None:  # fmt: skip
     stars, local = mesh.topology.stars(), mesh.along_curve(points)
     states = mesh.along_curve(mesh.movable if only is None else only).astype(np.uint8) * kernels.DUE
+    floor = 1e-9 if move is Move.COME_BACK else -math.inf
     kernels.relocate(
-        move, local, states, stars, blocks, threshold_sine2, -math.inf, mesh.along_curve(mesh.points), max_move,
-        threads,
-    )  # fmt: skip
+        move, local, states, stars, blocks, threshold_sine2, floor, mesh.along_curve(mesh.points), max_move, threads
+    )
     points[stars.vertices] = local
 
 
-def relocated(mesh: Mesh, move: Move, threads: int, rotate: int) -> bytes:
-    points = mesh.points.copy()
+def relocated(mesh: Mesh, move: Move, threads: int, rotate: int, begin: Mesh | None = None) -> bytes:
+    points = (begin or mesh).points.copy()
     for blocks in mesh.topology.colours:
         rolled = np.roll(blocks, rotate)
         relocate(mesh, move, points, rolled, threshold_sine2=0.07, threads=threads)
@@ -225,10 +225,11 @@ def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move
         Move.MEAN_ANGLE,
     )
     start = tangle(fine, 5, 0.3) if smoothing else tangle(fine)
-    expected = relocated(start, move, 1, 0)
-    assert expected != start.points.tobytes()
+    begin = fine if move is Move.COME_BACK else start
+    expected = relocated(start, move, 1, 0, begin)
+    assert expected != begin.points.tobytes()
     for threads, rotate in ((1, 1), (2, 0), (2, 2), (3, 0), (3, 1)):
-        assert relocated(start, move, threads, rotate) == expected
+        assert relocated(start, move, threads, rotate, begin) == expected
 
 
 def built_for(name: str) -> Any:
@@ -407,7 +408,28 @@ def test_validity_is_relative_to_the_simplex() -> None:
     assert kernels.measure(points, tetrahedron, 1)[1][0] == 0
 
 
-@pytest.mark.parametrize("move", list(Move))
+def test_vertices_come_back_as_far_as_the_mesh_stays_valid(mesh: Mesh) -> None:
+    """Where all of the way is valid, to the very bits; else nearer, and no determinant is below the floor."""
+    near = mesh.with_points(tangle(mesh, 100, 1e-3).points)
+    assert near.check()[0] == 0
+    points = mesh.points.copy()
+    for blocks in mesh.topology.colours:
+        relocate(near, Move.COME_BACK, points, blocks)
+    assert points.tobytes() == near.points.tobytes()
+    tangled, points, moved = tangle(mesh, 25, 0.6), mesh.points.copy(), 0
+    assert tangled.check()[0] > 0
+    for _ in range(3):
+        before = np.linalg.norm(points - tangled.points, axis=1)
+        for blocks in mesh.topology.colours:
+            relocate(tangled, Move.COME_BACK, points, blocks)
+        after = np.linalg.norm(points - tangled.points, axis=1)
+        assert (after <= before * (1 + 1e-12)).all()
+        moved += int((after < before).sum())
+        assert mesh.with_points(points.copy()).check()[0] == 0
+    assert moved > 10
+
+
+@pytest.mark.parametrize("move", [move for move in Move if move is not Move.COME_BACK])
 def test_no_vertex_goes_beyond_its_reach(mesh: Mesh, move: Move) -> None:
     start = tangle(mesh, 5, 0.3) if move in SMOOTHING_MOVES else tangle(mesh)
     threshold = 0.01 if move in (Move.MEAN_RATIO, Move.MEAN_ANGLE) else 1.0

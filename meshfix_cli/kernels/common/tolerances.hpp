@@ -38,6 +38,9 @@ constexpr int NEWTON_TRIALS = 5;       // steps, each half as long as the one be
 constexpr double ASCENT_STEP = 0.16;   // first step for the mean angle, in star radii
 constexpr int ASCENT_TRIALS = 6;
 
+// Of the way back: smaller shares are not worth a step, and would have no end.
+constexpr double LEAST_SHARE = 0.01;
+
 // Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:
 // files of six digits, or in single precision, make facets that only touch interpenetrate by less.
 constexpr double CROSSING = 1e-5;

@@ -176,7 +176,7 @@ void bind_moves(nb::module_& m) {
         .def("evaluate", &evaluate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a,
              "threads"_a);
 
-    static_assert(static_cast<int>(Move::mean_angle) == 8, "the codes of strategies.Move");
+    static_assert(static_cast<int>(Move::come_back) == 9, "the codes of strategies.Move");
 }
 
 }  // namespace meshfix

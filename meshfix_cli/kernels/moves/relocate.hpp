@@ -5,6 +5,7 @@
 #include "common/parallel.hpp"
 #include "mesh/order.hpp"
 #include "moves/active_set.hpp"
+#include "moves/come_back.hpp"
 #include "moves/laplacian.hpp"
 #include "moves/linear_program.hpp"
 #include "moves/mean_angle.hpp"
@@ -14,7 +15,7 @@ namespace meshfix {
 
 enum class Move : int {
     laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
-    mean_angle
+    mean_angle, come_back
 };
 
 struct Parameters {
@@ -138,6 +139,17 @@ struct Relocation {
                              : improve_mean_ratio<D>(star, quality, floor, reachable));
     }
 
+    // As far back to the start as makes no determinant smaller than `min_det`; all the way to its very bits.
+    bool come_back(std::int64_t v) {
+        const Vec<D> start = load<D>(parameters.start + v * D), target = star.to_local(start);
+        if (target == star.position || !star.valid(star.position)) return false;
+        const double scale = D == 2 ? star.unit * star.unit : star.unit * star.unit * star.unit;
+        const double share = share_of_way<D>(star, target, parameters.min_det / scale);
+        if (share < LEAST_SHARE) return false;
+        const Vec<D> x = share == 1.0 ? target : star.snap(star.position + share * (target - star.position));
+        return star.valid(x) && store(v, share == 1.0 ? start : star.to_global(x));
+    }
+
     Vec<D> smoothed(double quality, bool optimise) {
         Vec<D> x = smart_laplacian(star, quality);
         if (optimise && quality < LP_PINCHED_SINE2) x = smart_programme(x, quality);
@@ -189,6 +201,7 @@ struct Relocation {
             case Move::mean_ratio: counts.moved += smooth_mean(v, false); break;
             case Move::raise_smallest: counts.moved += raise_smallest(v); break;
             case Move::mean_angle: counts.moved += smooth_mean(v, true); break;
+            case Move::come_back: counts.moved += come_back(v); break;
             case Move::laplacian: break;
         }
     }

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     Steps = Iterator[tuple[Mesh, SweepRecord]]
 
 
+MOST_NAMED = 20  # of what is dropped
+
+
 @dataclass(frozen=True)
 class Held:
     """What is held still beside the boundary, and what is one point: see `reading.read`."""
@@ -40,6 +43,7 @@ class Held:
     fix: str | None = None
     regions: str | None = None
     join_points: bool = False
+    input_format: str | None = None
 
     def read(self, source: str, threads: int, *, double: bool = False, fix_orientation: bool = False) -> Document:
         """Read a mesh; the errors are those of `reading.read`."""
@@ -47,7 +51,7 @@ class Held:
 
         return read(
             source, self.fix, self.regions, double=double, fix_orientation=fix_orientation,
-            join_points=self.join_points, threads=threads,
+            join_points=self.join_points, form=self.input_format, threads=threads,
         )  # fmt: skip
 
 
@@ -95,10 +99,20 @@ class Files:
         stored, dropped = write(document, mesh, self.target, output, self.backup, put)
         if document.is_kept_by(output):
             return stored, ()
-        if not document.source.spliced:
-            return stored, (f"written anew as {output.name} by meshio: what it does not know of the input is lost",)
-        lost = f"; dropped: {', '.join(dropped)}" if dropped else ""
-        return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
+        if document.is_as_read(stored, output):
+            return stored, ()
+        lost = f"; dropped: {_listed(dropped)}" if dropped else ""
+        if output.reader != document.format.reader:
+            return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
+        if not lost and (document.source.data is None or b"\0" in document.source.data):
+            lost = ": what it does not know of the input is lost"
+        return stored, (f"written anew as {output.name} by meshio{lost}",)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Name the first of some things, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMED} more" * (len(names) > MOST_NAMED)
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 @dataclass(frozen=True)

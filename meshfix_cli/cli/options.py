@@ -89,6 +89,12 @@ def _metrics() -> tuple[str, ...]:
     return tuple(METRICS)
 
 
+def _readers() -> tuple[str, ...]:
+    from meshfix_cli.meshfile.formats import readers
+
+    return readers()
+
+
 def _formats() -> tuple[str, ...]:
     from meshfix_cli.meshfile.formats import writers
 
@@ -194,6 +200,9 @@ holding = packed(
     Held,
     click.option("--fix", metavar="NAME", help="Hold the vertices where this point-data array is not zero."),
     click.option("--regions", metavar="NAME", help="Hold the interfaces between the regions of this cell-data array."),
+    click.option(
+        "--input-format", type=_Choice(_readers), metavar="NAME", help="What INPUT is, whatever it looks like."
+    ),
     click.option("--join-points", is_flag=True, help="Treat points of exactly equal coordinates as one; write each."),
 )
 _SHOW = (

@@ -18,7 +18,7 @@ from meshfix_cli.mesh.topology import Topology
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
-from meshfix_cli.meshfile.source import Cells, Source
+from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +122,12 @@ class Document:
         here, there = Path(self.name), Path(target)
         return target != "-" and here.is_file() and there.is_file() and here.samefile(there)
 
+    def is_as_read(self, mesh: Mesh, form: Format) -> bool:
+        """Whether a moved mesh is, in a format, the very file that was read, and that file is all there is."""
+        data = self.source.data
+        alone = data is not None and not (form.name == "tetgen" or (form.name == "xdmf" and b".h5" in data))
+        return alone and form == self.format and self.file_points(mesh).tobytes() == self.source.points.tobytes()
+
     def is_kept_by(self, form: Format) -> bool:
         """Whether writing in a format keeps all but the coordinates, byte for byte."""
         return form == self.format and self.source.spliced
@@ -165,10 +171,14 @@ def build(
     if fix is not None:
         held[f"by --fix {fix}"] = _fixed_by(source, fix)
     mesh = replace(Mesh.build(points, simplices, threads=threads), apart=source.apart)
+    if not source.oriented:  # the numbering says nothing
+        mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
     topology = mesh.topology
     reasons = {"on the boundary": topology.boundary}
     for key in source.regions:
         labels = np.concatenate([source.arrays.cell[key][i] for i in chosen])
+        if key not in REGIONS and key != regions and not _are_labels(labels):
+            continue
         if labels.ndim != 1:
             raise ReadError(f"the cell data {key!r} are not labels of regions: they have {labels.shape[1]} components")
         reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, simplices, topology))
@@ -194,7 +204,7 @@ def with_reversed(source: Source, rows: Mapping[int, NDArray[np.int64]]) -> Sour
         vertices = cells[run].vertices.copy()
         vertices[here, :2] = vertices[here, 1::-1]
         cells[run] = replace(cells[run], vertices=vertices)
-    return replace(source, cells=cells)
+    return replace(source, cells=cells, data=None)
 
 
 def _solved(source: Source) -> Element:
@@ -210,6 +220,13 @@ def _solved(source: Source) -> Element:
 
 def _runs_of(source: Source, element: Element) -> list[int]:
     return [i for i, run in enumerate(source.cells) if run.type == element.key]
+
+
+def _are_labels(values: NDArray[Any]) -> bool:
+    """Whether an array of which only the name says so tells materials apart: whole numbers, one for each cell."""
+    if values.ndim != 1 or values.dtype.kind not in "biuf":
+        return False
+    return bool(values.dtype.kind in "biu" or (np.isfinite(values) & (values == np.round(values))).all())
 
 
 def _simplices(source: Source, element: Element, copies: NDArray[np.int64] | None = None) -> NDArray[np.int64]:

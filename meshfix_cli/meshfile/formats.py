@@ -127,28 +127,20 @@ def sniff(data: bytes) -> Format | None:
     return next((form for form in found if form is not None), None) or _of_meshio(text)
 
 
+# A line of five counts, behind comments, and the first node; such a file may be called .inp, as those of Abaqus.
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_UCD = re.compile(rf"(?:#[^\n]*\n\s*)*(?:\d+[ \t]+){{4}}\d+\s*\n\s*\d+(?:\s+{_NUMBER}){{3}}\s*\n")
+
+
 def _of_meshio(text: str) -> Format | None:
     """Recognise what only meshio reads."""
     if _is_xml(text):
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
-    return Format("off") if text.startswith("OFF") else Format("su2") if text.startswith("NDIME") else None
-
-
-def missing_part(data: bytes, form: Format, cells: int) -> str | None:
-    """Say what a file announces but does not hold; meshio reads some truncated files without a word.
-
-    `cells` is the number of cells that were read, or -1 before they are.
-    """
-    if form.name == "permas" and b"$FIN" not in data:
-        return "it does not end with $FIN"
-    if form.name == "mdpa" and len(re.findall(rb"(?m)^Begin ", data)) != len(re.findall(rb"(?m)^End ", data)):
-        return "a block does not end"
-    if cells < 0:
-        return None
-    found = re.search(rb"NELEM\s*=\s*(\d+)", data) if form.name == "su2" else None
-    if found and cells < int(found[1]):
-        return f"it announces {int(found[1]):,} cells and holds {cells:,}"
-    return None
+    if re.match(r"(?:%[^\n]*\n\s*)*(?:NDIME|NZONE|NELEM|NPOIN)\s*=", text):
+        return Format("su2")
+    if _UCD.match(text):
+        return Format("avsucd")
+    return Format("off") if re.match(r"(?:ST)?(?:C)?(?:N)?OFF\b", text) else None
 
 
 def by_name(path: Path) -> Format | None:
@@ -178,3 +170,10 @@ def options(form: Format) -> dict[str, object]:
     if form.name == "vtu":
         return {"binary": True}  # meshio's text has 12 digits, which would move fixed vertices
     return {} if form.binary is None else {"binary": form.binary}
+
+
+def readers() -> tuple[str, ...]:
+    """Names of the formats that can be read."""
+    import meshio
+
+    return tuple(sorted(set(meshio._helpers.reader_map) - set(ENDLESS)))

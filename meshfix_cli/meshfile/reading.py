@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, ReadError, naming
 from meshfix_cli.kernels import use_threads
 from meshfix_cli.mesh.elements import counted
-from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.document import Document, build, with_reversed
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.pieces import join
@@ -32,6 +32,7 @@ def read(
     double: bool = False,
     fix_orientation: bool = False,
     join_points: bool = False,
+    form: str | None = None,
     threads: int = 1,
 ) -> Document:
     """Read a triangle or tetrahedral mesh.
@@ -50,6 +51,8 @@ def read(
         Renumber the simplices that have the negative orientation, by exchanging two of their vertices.
     join_points : bool
         Treat points of exactly equal coordinates as one while solving; each of them is written.
+    form : str, optional
+        The name of the format, one of `formats.readers()`; default: what the file looks like.
     threads : int
 
     Raises
@@ -62,16 +65,18 @@ def read(
     use_threads(threads)
     streamed = os.fspath(path) == "-"
     name = "<stdin>" if streamed else os.fspath(path)
+
+    def built(source: Source, found: Format) -> Document:
+        return build(name, source, found, fix, regions, join_points, threads)
+
     with naming(name):
-        source, form = _open(None if streamed else Path(name), double, threads)
-        document = build(name, source, form, fix, regions, join_points, threads)
+        source, found = _open(None if streamed else Path(name), double, form, threads)
+        document = built(source, found)
         rows = document.reversed_cells() if fix_orientation else {}
         if rows:
             shape = document.mesh.topology.element.shape
             note = f"renumbered {counted(sum(map(len, rows.values())), shape.name, shape.plural)}"
-            document = build(
-                name, _with_reversed(document.source, rows, form, threads), form, fix, regions, join_points, threads
-            )
+            document = built(_with_reversed(document.source, rows, found, threads), found)
             document = replace(document, notes=(*document.notes, note))
         return document
 
@@ -89,7 +94,7 @@ def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
         return [], []
 
 
-def _open(path: Path | None, double: bool, threads: int) -> tuple[Source, Format]:
+def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tuple[Source, Format]:
     """Read what a file holds, or stdin, or several files, and in which format."""
     if path is not None and "*" in str(path) and not path.exists():
         from meshfix_cli.meshfile.gmsh.parts import Parts
@@ -98,7 +103,7 @@ def _open(path: Path | None, double: bool, threads: int) -> tuple[Source, Format
     if path is not None and set("?[") & set(path.name) and not path.exists():
         raise ReadError("there is no such file; the files of one mesh are named with a *")
     data = _read_bytes(path)
-    form = formats.sniff(data) or formats.by_name(Path() if path is None else path)
+    form = _format(data, Path() if path is None else path, name)
     if form is None:
         raise ReadError("the format is not recognised")
     beside = path if path is not None and path.is_file() else None  # a pipe can be read only once
@@ -110,6 +115,17 @@ def _open(path: Path | None, double: bool, threads: int) -> tuple[Source, Format
     if double and source.points.dtype != np.float64:
         source = _promoted(data, form)
     return source, form
+
+
+def _format(data: bytes, path: Path, name: str | None) -> Format | None:
+    """Find out which format a file has, unless its name is given."""
+    form = formats.sniff(data)
+    if name is not None:
+        return form if form is not None and form.reader == name else Format(name)
+    other = foreign.name_of(data, path.suffix.lower())
+    if other is not None:
+        raise ReadError(f"is a file of {other}, which meshfix does not read")
+    return form or formats.by_name(path)
 
 
 def _open_pieces(family: Family, double: bool, threads: int) -> tuple[Source, Format]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -18,8 +19,22 @@ from meshfix_cli.meshfile.splice import Points
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
 REGIONS = (
     "gmsh:physical", "gmsh:physical_set", "medit:ref", "cell_tags", "abaqus:section", "obj:material", "stl:solid",
+    "nastran:ref", "avsucd:material", "exodus:block", "flac3d:group", "netgen:index", "tetgen:ref", "ugrid:ref",
     "MaterialIDs", "CellEntityIds", "RegionId",
 )  # fmt: skip
+# What is left of their names in small letters, without "id", "ids" and what is no letter.
+_LIKE = frozenset({
+    "material", "materials", "mat", "region", "regions", "cellentity", "part", "block", "elementblock", "subdomain",
+    "domain", "zone", "attribute",
+})  # fmt: skip
+
+
+def regions_among(names: Iterable[str]) -> tuple[str, ...]:
+    """Return which cell arrays tell materials apart: `material_id`, `MatID` and `Region` are as good as `REGIONS`."""
+    present = list(names)
+    known = [name for name in REGIONS if name in present]
+    words = {name: re.sub(r"ids?$", "", re.sub(r"[^a-z]", "", name.lower())) for name in present}
+    return (*known, *(name for name in present if name not in known and words[name] in _LIKE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +178,10 @@ class Source:
     numbers : callable
         Gives the numbers (n,) int64 of the points, by which pieces of a mesh tell which of them are the same; None:
         the file has none.
+    data : bytes or None
+        The file as it is, where it can only be written anew: unmoved it is given back.
+    oriented : bool
+        The numbering of cells tells their orientation.
     apart : bool
         The parts of the mesh have coordinates of their own, in which they may lie over one another.
     pieces : Pieces or None
@@ -178,6 +197,8 @@ class Source:
     untold: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     numbers: Callable[[], NDArray[np.int64] | None] = lambda: None
+    data: bytes | None = field(default=None, repr=False)
+    oriented: bool = True
     apart: bool = False
     pieces: Pieces | None = None
 

@@ -7,22 +7,25 @@ import io
 import re
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import meshio
 import numpy as np
+from meshio.mdpa._mdpa import _mdpa_to_meshio_type
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
-from meshfix_cli.mesh.elements import ELEMENTS, solved_among
-from meshfix_cli.meshfile import formats
+from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, solved_among
+from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.formats import Format
-from meshfix_cli.meshfile.source import REGIONS, Arrays, Cells, Source
+from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
+BLOCK = "exodus:block"
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _WITH_SETS = ("abaqus", "exodus")
@@ -37,10 +40,11 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
             path.write_bytes(data)
             return read(data, form, path)
     with _sentences(ReadError, f"is not a readable {form.name} file", path):
-        _refuse(formats.missing_part(data, form, -1))
+        _refuse(foreign.misread(data, form))
+        _refuse(_unknown_elements(data) if form.name == "mdpa" else None)
         mesh = meshio.read(path, file_format=form.reader)
-        _refuse(formats.missing_part(data, form, sum(len(block.data) for block in mesh.cells)))
-        return _source(mesh)
+        _refuse(foreign.missing_cells(data, form, sum(len(block.data) for block in mesh.cells)))
+        return _source(mesh, data, form)
 
 
 def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
@@ -66,9 +70,16 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
         path.write_bytes(path.read_bytes().replace(b"TYPE=R3D3\n", b"TYPE=CPS3\n"))
 
 
-def _refuse(missing: str | None) -> None:
-    if missing:
-        raise ReadError(f"is truncated: {missing}")
+def _unknown_elements(data: bytes) -> str | None:
+    """Name elements of Kratos that meshio does not know, and takes for others with as many nodes."""
+    names = re.findall(rb"(?m)^\s*Begin\s+(?:Elements|Conditions)\s+(\w+)", data)
+    unknown = [name.decode() for name in names if name.decode() not in _mdpa_to_meshio_type]
+    return f"has elements called {unknown[0]}, which are not known" if unknown else None
+
+
+def _refuse(why: str | None) -> None:
+    if why:
+        raise ReadError(why)
 
 
 def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kept: list[int], form: Format) -> Any:
@@ -120,10 +131,12 @@ def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, 
     return sets
 
 
-def _source(mesh: Any) -> Source:
+def _source(mesh: Any, data: bytes, form: Format) -> Source:
     points = _native(mesh.points)
-    cells = [Cells(block.type, _native(block.data)) for block in mesh.cells]
+    cells = _numbered([Cells(block.type, _native(block.data)) for block in mesh.cells], foreign.numbers(data, form))
     cell = {name: [_native(data) for data in runs] for name, runs in mesh.cell_data.items()}
+    if form.name == "exodus":  # whose blocks are the regions; meshio has a run for each, and does not number them
+        cell[BLOCK] = [np.full(len(run.vertices), number) for number, run in enumerate(cells, 1)]
     arrays = Arrays(
         point={name: _native(data) for name, data in mesh.point_data.items()},
         cell=cell,
@@ -138,8 +151,33 @@ def _source(mesh: Any) -> Source:
         points if points.dtype.kind == "f" else points.astype(np.float64),
         cells,
         load=lambda: arrays,
-        regions=tuple(name for name in REGIONS if name in cell),
+        regions=regions_among(cell),
+        data=data,
+        oriented=not _arbitrary(form, cells),
     )
+
+
+def _numbered(cells: list[Cells], numbers: dict[str, NDArray[np.int64]]) -> list[Cells]:
+    """Give cells the numbers of their type, one run of it after the other, where these are as many."""
+    counts: dict[str, int] = {}
+    for run in cells:
+        counts[run.type] = counts.get(run.type, 0) + len(run.vertices)
+    used = dict.fromkeys(counts, 0)
+    numbered = []
+    for run in cells:
+        mine = numbers.get(run.type, np.empty(0, dtype=np.int64))
+        begin = used[run.type]
+        used[run.type] += len(run.vertices)
+        known = len(mine) == counts[run.type]
+        numbered.append(replace(run, ids=mine[begin : used[run.type]]) if known else run)
+    return numbered
+
+
+def _arbitrary(form: Format, cells: list[Cells]) -> bool:
+    """Whether cells are numbered with no regard to their orientation: dolfin's are, with ascending vertices."""
+    simplices = [run.vertices for run in cells if run.type in (one.key for one in SIMPLICES.values())]
+    ascending = all((np.diff(vertices, axis=1) > 0).all() for vertices in simplices)
+    return form.name == "dolfin-xml" or (form.name == "xdmf" and ascending)
 
 
 @contextlib.contextmanager
@@ -160,7 +198,9 @@ def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None
     except ImportError as error:
         cause, reason = error, f"that needs the package {error.name}"
     except Exception as error:
-        cause, reason = error, str(error) or f"{type(error).__name__} in meshio"
+        # What meshio says is for people; what the libraries below it say is not.
+        said = str(error) if isinstance(error, (meshio.ReadError, meshio.WriteError)) else ""
+        cause, reason = error, said or "meshio cannot make sense of it"
     reason = " ".join(reason.replace(str(path), "it").split())[:200]
     raise kind(f"{what} ({reason})") from cause
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import PARTS, Format
@@ -73,13 +73,19 @@ def write(
         write_file(target, partial(_splice, layout, source.points, points, put), backup)
         return stored, ()
     dropped: tuple[str, ...] = ()
+    unmoved = source.data if document.is_as_read(mesh, form) else None
 
     def produce(temporary: Path) -> None:
         nonlocal stored, dropped
+        if unmoved is not None:
+            temporary.write_bytes(unmoved)
+            return
         try:
             held, dropped = _write_anew(temporary, source.merged(), points, form, mesh.topology.element)
         except WriteError as error:
             raise WriteError(f"{target}: {error}") from error
+        if form == document.format and source.data is not None:
+            dropped = (*dropped, *foreign.words_lost(source.data, temporary.read_bytes()))
         stored = document.in_plane(held, mesh)
 
     write_file(target, produce, backup)

@@ -66,8 +66,8 @@ def steps(
     only_invalid : bool
         Move nothing but the stars of inverted elements and the rings around them, as many as it takes.
     hopeless : (m,) bool, optional
-        Simplices, in the order of the connectivity, that may be inverted for good: see `Obstacles.hopeless`. They move
-        with the others, but nothing waits for them. Inverted simplices without a free vertex are always among them.
+        Simplices, in the order of the connectivity, that may be inverted for good: see `Obstacles.hopeless`. Sweeps
+        try to mend them, but the energy is not minimised for them.
     threads : int
     team : Team, optional
         The processes of which each has a part of the mesh; the meshes are parts, the records are of the whole.
@@ -88,7 +88,7 @@ def steps(
         return
     for phase in phases:
         untangling = not phase.smooths
-        if untangling and run.left == 0:
+        if untangling and run.is_done(phase):
             continue
         limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
         if untangling and sweeps is not None:
@@ -101,7 +101,7 @@ def steps(
             yield run.mesh, run.record
             if sweeps is not None and untangling:
                 sweeps -= 1
-            if untangling and run.left == 0:
+            if untangling and run.is_done(phase):
                 break
             if len(phase.moves) == 1 and run.record.moved == 0:
                 break
@@ -148,12 +148,15 @@ class _Run:
         fixed = self.stars.simplices[stuck]
         inverted = kernels.check(self.points, fixed, threads)[0]
         self.stuck = np.delete(fixed, inverted, axis=0)
-        lost = stuck[inverted] if hopeless is None else np.union1d(stuck[inverted], np.flatnonzero(hopeless))
         self.mendable, self.own = self.stars.simplices, team.own_simplices
-        self.hopeless, self.own_hopeless = self.mendable[lost], self.own[lost]
-        if len(lost):
-            self.mendable, self.own = np.delete(self.mendable, lost, axis=0), np.delete(self.own, lost)
-        self.some_are_hopeless = team.total(len(lost)) > 0
+        lost = int(self.own[stuck[inverted]].sum())
+        self.hopeless = np.zeros(len(self.mendable), dtype=bool) if hopeless is None else hopeless
+        if len(inverted):
+            self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
+            self.own = np.delete(self.own, stuck[inverted])
+            self.hopeless = np.delete(self.hopeless, stuck[inverted])
+        self.beyond_repair = team.total(lost), team.least(kernels.check(self.points, fixed[inverted], threads)[1])
+        self.some_are_hopeless = team.total(int(self.hopeless.any())) > 0
         self.changed = np.zeros(len(self.points), dtype=bool)
         self._check()
         self.record = self._record("input", 0, 0)
@@ -201,6 +204,10 @@ class _Run:
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
 
+    def is_done(self, phase: Phase) -> bool:
+        """Whether nothing is left for a phase of untangling: sweeps are cheap, the energy needs a promise."""
+        return (self.left if phase.moves else self.promising) == 0
+
     def gained(self) -> bool:
         """Whether the mean or the smallest of the smallest angles is larger than in the input, by more than `GAIN`."""
         before, after = self._angles(self.first[0]), self._angles(self.points)
@@ -233,21 +240,20 @@ class _Run:
     def _check(self) -> None:
         """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure.
 
-        `lost` are the same two numbers of what is hopeless.
+        `promising` is how many of them are worth the energy.
         """
         self.inverted, smallest = kernels.check(self.points, self.mendable, self.threads)
-        self.left = self.team.total(int(self.own[self.inverted].sum()))
-        self.measure = self.team.least(smallest)
-        self.lost = 0, math.inf
+        self.left = self.promising = self.team.total(int(self.own[self.inverted].sum()))
         if self.some_are_hopeless:
-            inverted, smallest = kernels.check(self.points, self.hopeless, self.threads)
-            self.lost = self.team.total(int(self.own_hopeless[inverted].sum())), self.team.least(smallest)
+            own = self.own[self.inverted] & ~self.hopeless[self.inverted]
+            self.promising = self.team.total(int(own.sum()))
+        self.measure = self.team.least(smallest)
 
     def _rank(self) -> tuple[int, float]:
         return self.left, -self.measure
 
     def _record(self, phase: str, sweep: int, moved: int) -> SweepRecord:
-        inverted, measure = self.left + self.lost[0], min(self.measure, self.lost[1])
+        inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
         return SweepRecord(phase, sweep, inverted, measure, moved, time.perf_counter() - self.clock)
 
     def _broken(self) -> NDArray[np.bool_]:

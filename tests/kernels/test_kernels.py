@@ -10,7 +10,7 @@ from typing import Any
 import generate
 import numpy as np
 import pytest
-from meshes import random_star, star_of, star_rows, tangle
+from meshes import random_star, relocate, star_of, star_rows, tangle
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
@@ -192,19 +192,6 @@ def test_blocks_are_near_in_space_whatever_the_order_of_the_file(d: int, plate: 
 SMOOTHING_MOVES = (
     Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH, Move.RAISE_SMALLEST, Move.MEAN_RATIO, Move.MEAN_ANGLE
 )  # fmt: skip
-
-
-def relocate(
-    mesh: Mesh, move: Move, points: NDArray[np.float64], blocks: NDArray[np.int32],
-    only: NDArray[np.bool_] | None = None, threshold_sine2: float = 1.0, max_move: float = math.inf, threads: int = 1,
-) -> None:  # fmt: skip
-    stars, local = mesh.topology.stars(), mesh.along_curve(points)
-    states = mesh.along_curve(mesh.movable if only is None else only).astype(np.uint8) * kernels.DUE
-    floor = 1e-9 if move is Move.COME_BACK else -math.inf
-    kernels.relocate(
-        move, local, states, stars, blocks, threshold_sine2, floor, mesh.along_curve(mesh.points), max_move, threads
-    )
-    points[stars.vertices] = local
 
 
 def relocated(mesh: Mesh, move: Move, threads: int, rotate: int, begin: Mesh | None = None) -> bytes:
@@ -406,27 +393,6 @@ def test_validity_is_relative_to_the_simplex() -> None:
     tetrahedron = np.array([[0, 1, 2, 3]], dtype=np.int32)
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, np.nan]])
     assert kernels.measure(points, tetrahedron, 1)[1][0] == 0
-
-
-def test_vertices_come_back_as_far_as_the_mesh_stays_valid(mesh: Mesh) -> None:
-    """Where all of the way is valid, to the very bits; else nearer, and no determinant is below the floor."""
-    near = mesh.with_points(tangle(mesh, 100, 1e-3).points)
-    assert near.check()[0] == 0
-    points = mesh.points.copy()
-    for blocks in mesh.topology.colours:
-        relocate(near, Move.COME_BACK, points, blocks)
-    assert points.tobytes() == near.points.tobytes()
-    tangled, points, moved = tangle(mesh, 25, 0.6), mesh.points.copy(), 0
-    assert tangled.check()[0] > 0
-    for _ in range(3):
-        before = np.linalg.norm(points - tangled.points, axis=1)
-        for blocks in mesh.topology.colours:
-            relocate(tangled, Move.COME_BACK, points, blocks)
-        after = np.linalg.norm(points - tangled.points, axis=1)
-        assert (after <= before * (1 + 1e-12)).all()
-        moved += int((after < before).sum())
-        assert mesh.with_points(points.copy()).check()[0] == 0
-    assert moved > 10
 
 
 @pytest.mark.parametrize("move", [move for move in Move if move is not Move.COME_BACK])

@@ -291,7 +291,7 @@ def test_strings_in_binary_files() -> None:
     [
         (b"# vtk DataFile Version 3.0\ntitle\nASCII\n", "does not begin with"),
         (text("POINTS 5 double\n0 0 0 1"), "is truncated"),
-        (text(f"POINTS 5 double\n{POINTS}"), "no section of cells"),
+        (text(f"POINTS 5 double\n{POINTS}"), "no cells in it"),
         (text("POLYGONS 1 4\n3 0 1 2"), "POINTS is missing"),
         (text(f"POINTS 5 double\n{POINTS}\nCELLS 1 4\n3 0 1 2", "UNSTRUCTURED_GRID"), "CELL_TYPES is missing"),
         (text(f"POINTS 5 double\n{POINTS}\nCELLS 1 4\n3 0 1 2\nCELL_TYPES 2\n5 5", "UNSTRUCTURED_GRID"), "do not"),

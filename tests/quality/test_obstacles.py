@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -14,6 +15,8 @@ from meshfix_cli import kernels, untangle
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.quality.summary import summarise
+
+Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 @pytest.mark.parametrize("name", GEOMETRIES)
@@ -112,3 +115,89 @@ def test_crossings_against_brute_force(random: np.random.Generator, d: int) -> N
 
 def test_no_facets_no_crossings() -> None:
     assert kernels.crossings(np.zeros((3, 2)), np.zeros((0, 2), dtype=np.int32), 2).shape == (0, 2)
+
+
+def disc(segments: int, radius: float, rings: int = 3) -> Arrays:
+    """Points (n, 2) and triangles of a disc."""
+    angle = 2 * np.pi * np.arange(segments) / segments
+    points = [np.zeros((1, 2))]
+    points += [radius * k / rings * np.column_stack([np.cos(angle), np.sin(angle)]) for k in range(1, rings + 1)]
+    first, second = np.arange(segments), (np.arange(segments) + 1) % segments
+    cells = [np.column_stack([np.zeros(segments, dtype=int), 1 + first, 1 + second])]
+    return np.concatenate(points), np.concatenate([*cells, *_between(segments, rings - 1, 1)])
+
+
+def ring(segments: int, inner: float, outer: float, rings: int = 3) -> Arrays:
+    """Points (n, 2) and triangles of a disc with a hole, turned a little."""
+    angle = 2 * np.pi * np.arange(segments) / segments + 0.1
+    radii = np.linspace(inner, outer, rings + 1)
+    points = [radius * np.column_stack([np.cos(angle), np.sin(angle)]) for radius in radii]
+    return np.concatenate(points), np.concatenate(_between(segments, rings, 0))
+
+
+def _between(segments: int, rings: int, start: int) -> list[NDArray[np.int64]]:
+    first, second = np.arange(segments), (np.arange(segments) + 1) % segments
+    cells = []
+    for k in range(rings):
+        a, b = start + k * segments + first, start + k * segments + second
+        cells += [np.column_stack([a, a + segments, b]), np.column_stack([b, a + segments, b + segments])]
+    return cells
+
+
+def together(one: Arrays, other: Arrays, shift: tuple[float, float] = (0.0, 0.0)) -> Mesh:
+    points = np.concatenate([one[0], other[0] + np.array(shift)])
+    return Mesh.build(points, np.concatenate([one[1], other[1] + len(one[0])]))
+
+
+@pytest.mark.parametrize(("segments", "others"), [(8, 8), (8, 64), (64, 8), (16, 200), (200, 9), (200, 200)])
+def test_parts_that_overlap_and_parts_in_contact(segments: int, others: int) -> None:
+    """A pin in a hole interpenetrates it by the height of a chord; a disc in a disc, or half of one, is too much."""
+    assert not find_obstacles(together(disc(segments, 1), ring(others, 1, 2)))
+    assert not find_obstacles(together(disc(segments, 0.3), ring(others, 1, 2)))
+    nested = find_obstacles(together(disc(segments, 0.3), disc(others, 1)))
+    assert len(nested.overlapping) > 0
+    half = together(disc(segments, 1), disc(others, 1), (1.1, 0.2))
+    found = [find_obstacles(half, threads).overlapping.tolist() for threads in (1, 2)]
+    assert found[0] == found[1] != []
+    assert not find_obstacles(replace(half, apart=True))
+    assert not untangle(half).valid
+
+
+def test_simplices_of_one_free_vertex_that_exclude_each_other(random: np.random.Generator) -> None:
+    """Where HiGHS finds that the largest smallest determinant is not positive, and nowhere else, they are named."""
+    from scipy.optimize import linprog
+
+    named = 0
+    for _ in range(200):
+        count = int(random.integers(5, 9))
+        angle = np.sort(random.uniform(0, 2 * np.pi, count))
+        rim = np.column_stack([np.cos(angle), np.sin(angle)]) + random.normal(0, 0.35, (count, 2))
+        cells = [(count, i, (i + 1) % count) for i in range(count)]
+        mesh = Mesh.build(np.vstack([rim, [[0.0, 0.0]]]), cells)
+        if mesh.topology.flipped.any():
+            continue
+        tangled = mesh.with_points(np.vstack([rim, [[3.0, 2.0]]]))
+        a, b = rim, np.roll(rim, -1, axis=0)
+        rows = np.column_stack([-(a[:, 1] - b[:, 1]), -(b[:, 0] - a[:, 0]), np.ones(count)])
+        bounds_of = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        best = linprog([0, 0, -1], rows, bounds_of, bounds=[(None, None)] * 3)
+        largest, found = -best.fun, find_obstacles(tangled).exclusive
+        assert len(found) > 0 if largest < -1e-6 else len(found) == 0 or largest < 0
+        assert (untangle(tangled).records[-1].inverted == 0) == (largest > 1e-12)  # some turn twice around it
+        named += len(found) > 0
+        if len(found):  # and these few already exclude each other
+            few = linprog([0, 0, -1], rows[found], bounds_of[found], bounds=[(None, None)] * 3)
+            assert few.fun > 0
+    assert 10 < named < 190
+
+
+def test_nothing_waits_for_what_obstacles_name() -> None:
+    """A crossing boundary takes no more sweeps than it takes to mend the rest."""
+    mesh = Mesh.build(*GEOMETRIES["plate with holes"]())
+    points = mesh.points.copy()
+    hole = (np.linalg.norm(points[:, :2] - [0.8, 1.25], axis=1) < 0.36) & ~mesh.movable
+    points[hole, 1] += 0.5
+    outcome = untangle(mesh.with_points(points))
+    assert not outcome.valid
+    assert len([record for record in outcome.records if record.phase.startswith("FF")]) <= 30
+    assert outcome.obstacles.hopeless(mesh) is not None

@@ -70,8 +70,7 @@ def test_the_limit_is_that_of_all_untangling_sweeps(bracket: Mesh, strategy: str
         done = [p for p in phases if p not in ("input", "best")]
         assert len(done) == sweeps or (len(done) < sweeps and done[-1] == "FF")  # which has its own patience here
     assert "LP on invalid stars" in [r.phase for _, r in steps(stuck, plan("auto"), sweeps=8)]
-    assert untangle(stuck, strategy).obstacles  # which leave nothing to wait for
-    assert untangle(stuck, strategy, smooth=0).records[1:] == ()
+    assert untangle(stuck, strategy).obstacles
 
 
 def test_valid_mesh_goes_straight_to_smoothing(mesh: Mesh) -> None:

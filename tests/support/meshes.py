@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli import kernels
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.solve.perturb import perturb
+from meshfix_cli.solve.strategies import Move
 
 
 def tangle(mesh: Mesh, percent: float = 25, distance: float = 2, seed: int = 0) -> Mesh:
@@ -46,3 +50,17 @@ def random_star(
     moved = points * random.uniform(1 - spread, 1 + spread, (len(points), 1))
     moved += spread * random.standard_normal(points.shape)
     return np.ascontiguousarray(moved / np.abs(moved).max()), faces.astype(np.uint16)
+
+
+def relocate(
+    mesh: Mesh, move: Move, points: NDArray[np.float64], blocks: NDArray[np.int32],
+    only: NDArray[np.bool_] | None = None, threshold_sine2: float = 1.0, max_move: float = math.inf, threads: int = 1,
+) -> None:  # fmt: skip
+    """Relocate, in place, the free vertices, or `only` these (n,), of some blocks; they came from those of the mesh."""
+    stars, local = mesh.topology.stars(), mesh.along_curve(points)
+    states = mesh.along_curve(mesh.movable if only is None else only).astype(np.uint8) * kernels.DUE
+    floor = 1e-9 if move is Move.COME_BACK else -math.inf
+    kernels.relocate(
+        move, local, states, stars, blocks, threshold_sine2, floor, mesh.along_curve(mesh.points), max_move, threads
+    )
+    points[stars.vertices] = local

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.source import REGIONS, Cells
+from meshfix_cli.meshfile.source import Cells, regions_among
 
 # The name and the number of vertices; 0: any.
 TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() if element.vtk is not None} | {
@@ -105,7 +105,7 @@ def markings(
     damaged : str
         What is said of one that matters and cannot be read: else an interface would be free to move.
     """
-    regions, marks = tuple(name for name in REGIONS if name in names), GHOSTS & names
+    regions, marks = regions_among(sorted(names)), GHOSTS & names
     for name in (*regions, *marks):
         if name not in cell():
             raise ReadError(damaged.format(repr(name)))

@@ -88,7 +88,7 @@ def _tables(found: Sections) -> list[_Table]:
             first = tables[-1].first + len(tables[-1].types) if tables else 0
             tables.append(_table(first, keyword, found))
     if not tables:
-        raise ReadError("is truncated: it has no section of cells")
+        raise ReadError("there are no cells in it")
     return tables
 
 

@@ -1,0 +1,142 @@
+"""Files of other programs: named for what they are, numbered as they number, and nothing lost without a word."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from commands import error_line, run
+from shapes import plate
+
+from meshfix_cli import read, untangle, write
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.document import Document
+
+FOREIGN = {
+    "a.mesh": ("MFEM mesh v1.2\n\ndimension\n2\n", "MFEM"),
+    "b.mesh": ("MFEM NURBS mesh v1.0\n", "MFEM"),
+    "c.mesh": ("% GETFEM MESH FILE \n% GETFEM VERSION 5.0\n\nBEGIN POINTS LIST\n", "GetFEM"),
+    "d.msh": ('(0 "made by a mesher")\n(2 3)\n(10 (0 1 8 0))\n', "Ansys Fluent"),
+    "e.cas": ("(2 2)\n", "Ansys Fluent"),
+    "f.k": ("$ a comment\n*KEYWORD\n*NODE\n       1             0.0\n", "LS-DYNA"),
+    "g.inp": ("*NODE\n       1             0.0\n*ELEMENT_SOLID\n", "LS-DYNA"),
+    "h.msh": ("4 2 4\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n1 2 3 0\n", "FreeFEM"),
+    "i.msh": ("5 2 4\n0 0 0.5 1\n1 0 0 1\n", "FreeFEM"),
+}
+
+
+@pytest.mark.parametrize("name", FOREIGN)
+def test_a_format_is_called_by_its_name(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(FOREIGN[name][0])
+    line = error_line("untangle", tmp_path / name, tmp_path / "out.vtk")
+    assert line.endswith(f"{name}: is a file of {FOREIGN[name][1]}, which meshfix does not read")
+
+
+def test_the_name_of_the_format_can_be_given(tmp_path: Path) -> None:
+    points, cells = plate()
+    meshio.write(tmp_path / "mesh.dat", meshio.Mesh(points, [("triangle", cells)]), file_format="nastran")
+    assert read(tmp_path / "mesh.dat", form="nastran").mesh.topology.m == len(cells)
+    run("quality", "-q", "--input-format", "nastran", tmp_path / "mesh.dat", code=3)
+    assert "is not a readable medit file" in error_line("quality", "--input-format", "medit", tmp_path / "mesh.dat")
+    run("quality", "--input-format", "nonsense", tmp_path / "mesh.dat", code=2)
+
+
+def test_ucd_is_read_under_the_name_of_abaqus(tmp_path: Path) -> None:
+    lines = ["# made here", "5 4 0 0 0", "1 0 0 0", "2 1 0 0", "3 1 1 0", "4 0 1 0", "5 0.5 0.5 0"]
+    lines += ["7 1 tri 1 2 5", "8 1 tri 2 3 5", "9 1 tri 3 4 5", "10 1 tri 4 1 5", ""]
+    (tmp_path / "mesh.inp").write_text("\n".join(lines))
+    document = read(tmp_path / "mesh.inp")
+    assert document.format.name == "avsucd"
+    assert document.ids.tolist() == [7, 8, 9, 10]
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "words"),
+    [
+        ("a.su2", "NZONE= 2\nIZONE= 1\nNDIME= 2\nNELEM= 0\n", "holds 2 zones"),
+        ("a.xdmf", '<Xdmf><Domain><Grid Name="a"/><Grid Name="b"/></Domain></Xdmf>', "several grids"),
+        ("a.mdpa", "Begin Nodes\nEnd Nodes\nBegin Elements Element9D9N\nEnd Elements\n", "called Element9D9N"),
+    ],
+)  # fmt: skip
+def test_what_would_be_misread_is_refused(name: str, text: str, words: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(ReadError, match=words):
+        read(tmp_path / name)
+
+
+def su2(folder: Path, middle: str = "0.5 0.5") -> Path:
+    path = folder / "mesh.su2"
+    path.write_text(
+        "% a comment\nNDIME= 2\nNELEM= 6\n5 0 1 6 0\n9 1 2 5 4 1\n5 1 4 6 2\n5 4 3 6 3\n5 3 0 6 4\n5 1 2 5 5\n"
+        f"NPOIN= 7\n0 0 0\n1 0 1\n2 0 2\n0 1 3\n1 1 4\n2 1 5\n{middle} 6\n"
+        "NMARK= 1\nMARKER_TAG= wall\nMARKER_ELEMS= 2\n3 0 1\n3 1 2\n"
+    )
+    return path
+
+
+def test_elements_have_the_numbers_of_the_file(tmp_path: Path) -> None:
+    document = read(su2(tmp_path))
+    assert document.ids.tolist() == [0, 2, 3, 4, 5]
+    assert document.not_judged == {"quad": 1}
+
+
+def test_an_unmoved_mesh_comes_back_byte_for_byte_and_a_moved_one_tells_what_it_lost(tmp_path: Path) -> None:
+    path = su2(tmp_path)
+    run("untangle", "-q", path, tmp_path / "out.su2", code=3)
+    assert (tmp_path / "out.su2").read_bytes() == path.read_bytes()
+    text = run("untangle", su2(tmp_path, "1.5 0.5"), tmp_path / "out.su2", code=3).stdout.decode()
+    (note,) = [line for line in text.splitlines() if "written anew" in line]
+    assert {"wall", "MARKER_TAG", "quad cells", "line cells"} <= {*note.partition("dropped: ")[2].split(", ")}
+
+
+def test_regions_of_other_formats_are_held(tmp_path: Path) -> None:
+    points, cells = plate()
+    right = points[cells].mean(axis=1)[:, 0] > 1
+    interface = np.zeros(len(points), dtype=bool)
+    held = read_with(tmp_path / "plain.vtk", points, cells, {}).mesh.movable
+    for number, name in enumerate(("nastran:ref", "material", "Mat_ID", "RegionIds", "SUBDOMAIN", "part id")):
+        path = tmp_path / f"{number}.{'bdf' if ':' in name else 'vtk'}"
+        document = read_with(path, points, cells, {name.replace(" ", "_"): right.astype(np.int32) + 1})
+        assert (held & ~document.mesh.movable).any()
+        interface |= held & ~document.mesh.movable
+        assert (interface == (held & ~document.mesh.movable)).all()
+    density = {"material": np.random.default_rng(1).random(len(cells)), "materiality": right.astype(np.int32)}
+    assert (read_with(tmp_path / "f.vtk", points, cells, density).mesh.movable == held).all()
+
+
+def read_with(path: Path, points: np.ndarray, cells: np.ndarray, data: dict[str, np.ndarray]) -> Document:
+    mesh = meshio.Mesh(points, [("triangle", cells)], cell_data={name: [values] for name, values in data.items()})
+    mesh.write(path)
+    return read(path)
+
+
+def test_blocks_of_exodus_are_regions(tmp_path: Path) -> None:
+    pytest.importorskip("netCDF4", reason="netCDF4 is not installed")
+    points, cells = plate()
+    right = points[cells].mean(axis=1)[:, 0] > 1
+    meshio.Mesh(points, [("triangle", cells[~right]), ("triangle", cells[right])]).write(tmp_path / "two.e")
+    document = read(tmp_path / "two.e")
+    assert any(reason.startswith("between regions") for reason in document.fixed)
+
+
+def test_numbering_that_is_arbitrary_by_convention_is_no_fault(tmp_path: Path) -> None:
+    points, cells = plate()
+    meshio.Mesh(points[:, :2], [("triangle", np.sort(cells, axis=1))]).write(tmp_path / "mesh.xml")
+    document = read(tmp_path / "mesh.xml")
+    assert not document.mesh.topology.misnumbered.any()
+    outcome = untangle(document.mesh)
+    assert outcome.valid
+    write(document, outcome.after, tmp_path / "out.xml")
+    assert read(tmp_path / "out.xml").mesh.check()[0] == 0
+
+
+def test_words_of_libraries_do_not_reach_the_user(tmp_path: Path) -> None:
+    (tmp_path / "a.bdf").write_text("BEGIN BULK\nGRID,1,,x,y,z\nENDDATA\n")
+    assert "(meshio cannot make sense of it)" in error_line("quality", tmp_path / "a.bdf")
+    points, cells = plate()
+    quads = [("triangle", cells), ("quad", np.array([[0, 1, 2, 3]]))]
+    meshio.Mesh(points, quads).write(tmp_path / "in.vtk")
+    line = error_line("untangle", tmp_path / "in.vtk", tmp_path / "o.su2")
+    assert line.endswith("cannot be written as su2 (meshio cannot make sense of it)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
 import re
 import tempfile
@@ -42,6 +43,7 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
     with _sentences(ReadError, f"is not a readable {form.name} file", path):
         _refuse(foreign.misread(data, form))
         _refuse(_unknown_elements(data) if form.name == "mdpa" else None)
+        _refuse(_several_zones(path) if form.name == "cgns" else None)
         mesh = meshio.read(path, file_format=form.reader)
         _refuse(foreign.missing_cells(data, form, sum(len(block.data) for block in mesh.cells)))
         return _source(mesh, data, form)
@@ -75,6 +77,16 @@ def _unknown_elements(data: bytes) -> str | None:
     names = re.findall(rb"(?m)^\s*Begin\s+(?:Elements|Conditions)\s+(\w+)", data)
     unknown = [name.decode() for name in names if name.decode() not in _mdpa_to_meshio_type]
     return f"has elements called {unknown[0]}, which are not known" if unknown else None
+
+
+def _several_zones(path: Path) -> str | None:
+    """Say that a file of CGNS has several zones, of which meshio reads the first."""
+    import h5py
+
+    with h5py.File(path) as file:
+        bases = [base for base in file.values() if base.attrs.get("label") == b"CGNSBase_t"]
+        zones = sum(zone.attrs.get("label") == b"Zone_t" for base in bases for zone in base.values())
+    return f"holds {zones} zones, and one mesh is read: give each zone a file of its own" if zones > 1 else None
 
 
 def _refuse(why: str | None) -> None:
@@ -184,17 +196,22 @@ def _arbitrary(form: Format, cells: list[Cells]) -> bool:
 def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None]:
     """Turn whatever meshio raises into one sentence; also its sys.exit, for which it prints the reason."""
     printed = io.StringIO()
+    cause: BaseException
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             yield
         return
-    except (MeshfixError, OSError):
+    except MeshfixError:
         raise
+    except OSError as error:
+        if error.filename is not None:  # of ours; those of HDF5 are about what a file names, or about its content
+            raise
+        missing = error.errno == errno.ENOENT
+        cause, reason = error, "a file that it names is missing" if missing else "meshio cannot make sense of it"
     except SystemExit as error:
         if error.code not in (None, 1):  # that of a signal: meshio's is 1
             raise
-        cause: BaseException = error
-        reason = printed.getvalue()
+        cause, reason = error, printed.getvalue()
     except ImportError as error:
         cause, reason = error, f"that needs the package {error.name}"
     except Exception as error:

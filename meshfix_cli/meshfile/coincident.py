@@ -23,7 +23,7 @@ def first_of_each_place(points: NDArray[np.float64], rows: NDArray[np.integer]) 
         For each point the first at its place, itself where there is no other or where it is not looked at.
     """
     first = np.arange(len(points))
-    order = rows[np.lexsort((rows, *points[rows].T))]
+    order = rows[np.lexsort(points[rows].T)]  # which leaves those of one place in their order
     same = (points[order[1:]] == points[order[:-1]]).all(axis=1)
     begin = np.flatnonzero(np.concatenate([[True], ~same]))[: len(order)]
     first[order] = np.repeat(order[begin], np.diff(np.append(begin, len(order))))

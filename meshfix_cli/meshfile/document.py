@@ -164,7 +164,7 @@ def build(
 
     points, basis = _solved_points(source, simplices, dimension)
     copies = _copies(points, simplices) if join_points else None
-    simplices = _simplices(source, element, copies)
+    simplices = simplices if copies is None else copies[simplices]
     held = {"on other cells of the file": _on_other_cells(source, chosen, len(points))}
     if source.held is not None:
         held["by the file"] = source.held

@@ -84,12 +84,12 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     pairs = owners[kernels.crossings(points, facets, threads)]
     parts = connectivity.component[pairs]
     within = parts[:, 0] == parts[:, 1]
-    rows, rigid = connectivity.rows, np.setdiff1d(mesh.stuck(threads), inverted)
+    rows = connectivity.rows
     return Obstacles(
         np.sort(rows[inverted[free == 0]]),
         np.unique(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
         np.unique(np.sort(rows[pairs[within]], axis=1), axis=0),
-        np.sort(rows[_overlapping(mesh, points, pairs[~within], rigid, threads)]),
+        np.sort(rows[_overlapping(mesh, points, pairs[~within], inverted, threads)]),
     )
 
 
@@ -108,7 +108,7 @@ def _overlapping(
     mesh: Mesh,
     points: Array,
     crossing: NDArray[np.int32],
-    rigid: NDArray[np.int32],
+    inverted: NDArray[np.int32],
     threads: int,
 ) -> NDArray[np.int32]:
     """Return rows of the connectivity: simplices at places of their part that lie in another part as well.
@@ -119,8 +119,8 @@ def _overlapping(
         Pairs of simplices of different parts with facets that cross. Below all facets of these parts is looked, as
         deep as flat facets of that size may interpenetrate where curved parts are in contact, and at the centroids of
         simplices that are as large. One facet speaks for a part that crosses no other.
-    rigid : (r,) int32
-        Valid simplices without a free vertex: the others may be anywhere.
+    inverted : (i,) int32
+        Simplices whose centroids say nothing, as those of simplices with a free vertex, which may be anywhere.
     """
     connectivity = mesh.topology.connectivity
     component = connectivity.component
@@ -137,6 +137,7 @@ def _overlapping(
     below = np.where(length[parts] > 0, CONTACT * np.maximum(size, length[parts]), TOUCHING * size)
     places = corners.mean(axis=1) - below[:, None] * _outward(corners)
     asked = np.union1d(np.unique(parts, return_index=True)[1], np.flatnonzero(length[parts] > 0))
+    rigid = np.setdiff1d(mesh.stuck(threads), inverted)
     inner = rigid[(length[component[rigid]] > 0) & (largest[rigid] > AS_LARGE * length[component[rigid]])]
     owners = np.concatenate([rows[asked], inner]).astype(np.int32)
     places = np.concatenate([places[asked], points[connectivity.simplices[inner]].mean(axis=1)])

@@ -11,7 +11,7 @@ import generate
 import numpy as np
 import pytest
 from geometries import GEOMETRIES
-from meshes import tangle
+from meshes import tangle, with_an_inverted_fixed_simplex
 from scipy.spatial.transform import Rotation
 from tables import CASES
 
@@ -170,15 +170,6 @@ def test_the_best_smoothing_of_a_valid_mesh_is_not_held_back_by_the_threshold(me
 def test_smoothing_reaches_the_ceiling_that_fixed_vertices_set(bracket: Mesh) -> None:
     after = untangle(tangle(bracket)).after
     assert summarise(after).min_angle == pytest.approx(ceiling(bracket), rel=1e-12)
-
-
-def with_an_inverted_fixed_simplex(mesh: Mesh) -> Mesh:
-    """Reflect a vertex of a simplex that has no free vertex at the centre of the face opposite."""
-    simplices = mesh.topology.simplices
-    first, *others = simplices[~mesh.movable[simplices].any(axis=1)][0]
-    points = mesh.points.copy()
-    points[first] = 2 * points[others].mean(axis=0) - points[first]
-    return mesh.with_points(points)
 
 
 @pytest.mark.parametrize("strategy", STRATEGIES)

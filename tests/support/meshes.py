@@ -64,3 +64,12 @@ def relocate(
         move, local, states, stars, blocks, threshold_sine2, floor, mesh.along_curve(mesh.points), max_move, threads
     )
     points[stars.vertices] = local
+
+
+def with_an_inverted_fixed_simplex(mesh: Mesh) -> Mesh:
+    """Reflect a vertex of a simplex that has no free vertex at the centre of the face opposite."""
+    simplices = mesh.topology.simplices
+    first, *others = simplices[~mesh.movable[simplices].any(axis=1)][0]
+    points = mesh.points.copy()
+    points[first] = 2 * points[others].mean(axis=0) - points[first]
+    return mesh.with_points(points)

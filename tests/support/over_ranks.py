@@ -15,7 +15,7 @@ import numpy as np
 
 sys.path += [str(Path(__file__).parents[2] / "sample_meshes"), str(Path(__file__).parent)]
 import generate
-from meshes import tangle
+from meshes import tangle, with_an_inverted_fixed_simplex
 
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.repair import Method
@@ -36,6 +36,8 @@ METHODS = {
     "FF": Method("FF"),
     "onlyinvalid": Method(only_invalid=True),
     "onlyinvalidFF": Method("FF", only_invalid=True),
+    "back": Method(only_invalid=True, smooth=0),
+    "impossible": Method(),
     "near": Method(max_move=REACH),
     "nearFF": Method("FF", max_move=REACH),
     "plane": Method(),
@@ -55,6 +57,8 @@ def mesh_of(case: str) -> Mesh:
     valid = Mesh.build(*generate.bracket(0.06, 10))
     if case == "bestofvalid":
         return valid
+    if case == "impossible":
+        return with_an_inverted_fixed_simplex(tangle(valid, 25, 2))
     if case == "finished":  # nothing is left to be gained
         return Method(smooth="best").solve(Method(smooth="best").solve(valid, np.inf, 2).after, np.inf, 2).after
     return tangle(valid, 25, 1 if case == "onlyinvalid" else 2)

@@ -1,5 +1,14 @@
-"""`python -m meshfix_cli`."""
+"""`meshfix` and `python -m meshfix_cli`: from here on signals end the process without a word."""
+
+import os
+import signal
+
+# Before what takes a while to import; `cli.process` has handlers of its own.
+for _name in ("SIGINT", "SIGTERM", "SIGHUP"):
+    if hasattr(signal, _name) and signal.getsignal(getattr(signal, _name)) != signal.SIG_IGN:  # as nohup does
+        signal.signal(getattr(signal, _name), lambda number, _: os._exit(128 + number))
 
 from meshfix_cli.cli import main
 
-main(prog_name="meshfix")
+if __name__ == "__main__":
+    main(prog_name="meshfix")

@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from meshfix_cli.cli.process import closed
+from meshfix_cli.errors import WriteError
+
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
@@ -27,6 +30,8 @@ def open_files(files: Files, held: Held, threads: int, *others: str | None) -> t
     beside = given(*others)
     check_others(beside, files.source, files.target)
     check_input(files.source)
+    if files.target == "-" and "stdout" in closed and not files.dry_run:
+        raise WriteError("<stdout>: is closed, and the mesh goes there; name an OUTPUT")
     document, output = files.open(held, threads)
     written = (files.target,) if files.dry_run else document.outputs(files.target, output)
     check_others(beside, *document.files, *written)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
     from meshfix_cli.report.facts import Report
 
-FILE = click.Path(allow_dash=True)  # shells complete it; whether it exists, its reader tells
+# Shells complete it; whether it exists and can be read, its reader tells: what is replaced need not be readable.
+FILE = click.Path(allow_dash=True, readable=False)
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]

@@ -7,7 +7,7 @@ import signal
 import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -31,6 +31,8 @@ LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_ST
 
 # Processes that work for this one, and end with it.
 helpers: set[str] = set()
+# Streams that the shell has closed.
+closed: set[str] = set()
 
 
 class Commands(Mapping[str, click.Command]):
@@ -54,6 +56,24 @@ class Commands(Mapping[str, click.Command]):
 class Group(click.Group):
     """Errors are one line on stderr and an exit code, never a traceback; signals leave no temporary file."""
 
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        """Run the command line, with what it has printed out of the way at the end: there Python would complain."""
+        for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+            if getattr(sys, name) is None:  # closed by the shell: >&-
+                closed.add(name)
+                setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 (for the whole run)
+        try:
+            try:
+                return super().main(*args, **kwargs)
+            finally:
+                sys.stdout.flush()
+        except BrokenPipeError:  # whoever read our output has gone
+            _print_no_more()
+            sys.exit(128 + getattr(signal, "SIGPIPE", 13))
+        except OSError as error:
+            _print_no_more()
+            fail(_in_words(error))
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # read when numpy and scipy are loaded, later
@@ -61,20 +81,28 @@ class Group(click.Group):
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) != signal.SIG_IGN:  # as nohup does
                 signal.signal(getattr(signal, name), _stop)
-        for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
-            if getattr(sys, name) is None:  # closed by the shell: >&-
-                setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 (for the whole run)
         try:
             return super().invoke(ctx)
         except MeshfixError as error:
             fail(str(error))
         except MemoryError:
             fail("out of memory")
-        except BrokenPipeError:  # whoever read our output has gone, and Python would flush to it once more
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            sys.exit(128 + getattr(signal, "SIGPIPE", 13))
-        except OSError as error:
-            fail(str(error))
+        except RuntimeError as error:  # of pathlib, before Python 3.13
+            if not str(error).startswith("Symlink loop"):
+                raise
+            fail(f"{str(error).rpartition(' from ')[2].strip(chr(39))}: too many levels of symbolic links")
+
+
+def _in_words(error: OSError) -> str:
+    """Say what the system says, of the file it is about or of stdout."""
+    name = error.filename if error.filename is not None else "<stdout>"
+    return f"{os.fsdecode(name) if isinstance(name, (str, bytes)) else name}: {error.strerror or error}"
+
+
+def _print_no_more() -> None:
+    """Let what is still to be printed go nowhere: Python would try once more at the end."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _stop(number: int, frame: object) -> NoReturn:
@@ -84,6 +112,10 @@ def _stop(number: int, frame: object) -> NoReturn:
     """
     del frame
     signal.signal(number, signal.SIG_IGN)
+    for stream in (sys.stdout, sys.stderr):  # a live line hides the cursor
+        with suppress(OSError, ValueError):
+            if stream.isatty():
+                os.write(stream.fileno(), b"\x1b[?25h")
     atomic = sys.modules.get("meshfix_cli.meshfile.atomic")
     if helpers or getattr(atomic, "under_way", None):
         sys.exit(128 + number)
@@ -155,7 +187,8 @@ def abort_all(comm: Intracomm, error: BaseException) -> NoReturn:
     code = error.code if isinstance(error, SystemExit) and isinstance(error.code, int) else ERROR
     try:
         if isinstance(error, (MeshfixError, MemoryError, OSError)):
-            complain(f"process {comm.rank}: {str(error) or type(error).__name__}")
+            said = _in_words(error) if isinstance(error, OSError) else str(error)
+            complain(f"process {comm.rank}: {said or type(error).__name__}")
         elif not isinstance(error, SystemExit):  # of a signal
             traceback.print_exception(error)
         sys.stdout.flush()

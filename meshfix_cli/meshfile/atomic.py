@@ -8,6 +8,7 @@ import shutil
 import stat
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterable, Iterator
 from itertools import count
 from pathlib import Path
@@ -16,6 +17,8 @@ from meshfix_cli.errors import WriteError
 
 # Marks of what is being written: whoever ends the process while there are some must leave through every `finally`.
 under_way: set[object] = set()
+
+STALE = 3600.0  # seconds after which a temporary folder of a process that is not here is nobody's
 
 
 def check_target(target: str) -> None:
@@ -126,7 +129,8 @@ def _under_way() -> Iterator[None]:
 @contextlib.contextmanager
 def _folder(parent: Path) -> Iterator[Path]:
     """Make a folder that is gone in the end, also where a signal comes while it is made or removed."""
-    folder = parent / f".meshfix-{os.urandom(8).hex()}"
+    _remove_stale(parent)
+    folder = parent / f".meshfix-{os.getpid()}-{os.urandom(8).hex()}"
     try:
         folder.mkdir(0o700)
         yield folder
@@ -136,6 +140,28 @@ def _folder(parent: Path) -> Iterator[Path]:
         raise
 
 
+def _remove_stale(parent: Path) -> None:
+    """Remove what processes of this user that were killed have left there."""
+    if os.name != "posix":
+        return
+    with contextlib.suppress(OSError):
+        for folder in parent.glob(".meshfix-*-*"):
+            number = folder.name.split("-")[1]
+            if number.isdecimal() and folder.stat().st_uid == os.geteuid() and _is_over(folder, int(number)):
+                shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_over(folder: Path, process: int) -> bool:
+    """Whether a process is gone, and what it made is old enough that none of another machine may be at work on it."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return folder.is_dir() and not folder.is_symlink() and time.time() - folder.stat().st_mtime > STALE
+    except OSError:
+        pass
+    return False
+
+
 def write_text(target: str, text: str) -> None:
     """Write text as `write_file` does, in UTF-8."""
     # Names of files may hold bytes that are no text.
@@ -143,10 +169,10 @@ def write_text(target: str, text: str) -> None:
 
 
 def _complete(temporary: Path, path: Path) -> None:
-    """Give a file the mode of the one that it will replace, and see that it is on the disk."""
-    temporary.chmod(stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask())
-    with temporary.open("rb") as written:
+    """See that a file is on the disk, and give it the mode of the one that it will replace."""
+    with temporary.open("rb") as written:  # which that mode may not allow
         os.fsync(written.fileno())
+    temporary.chmod(stat.S_IMODE(path.stat().st_mode) if path.exists() else 0o666 & ~_umask())
 
 
 def _replace(temporary: Path, path: Path) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+import stat
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,12 +145,24 @@ def _open_pieces(family: Family, double: bool, threads: int) -> tuple[Source, Fo
 def _read_bytes(path: Path | None) -> bytes:
     """Read a file, or stdin."""
     try:
-        data = sys.stdin.buffer.read() if path is None else path.read_bytes()
+        with nullcontext(sys.stdin.buffer) if path is None else path.open("rb") as stream:
+            data = stream.read(formats.HEAD)
+            if _is_device(stream) and formats.sniff(data) is None:  # /dev/zero has no end
+                raise ReadError("is a device, and no mesh comes from it" if data else "is empty")
+            data += stream.read()
     except OSError as error:
         raise ReadError(error.strerror or str(error)) from error
     if not data:
         raise ReadError("is empty")
     return data
+
+
+def _is_device(stream: BinaryIO) -> bool:
+    """Whether a stream is a device, and not a terminal."""
+    try:
+        return stat.S_ISCHR(os.fstat(stream.fileno()).st_mode) and not stream.isatty()
+    except OSError:  # one of Python's own has no number
+        return False
 
 
 def parse(data: bytes, form: Format, path: Path | None = None) -> Source:

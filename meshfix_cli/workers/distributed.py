@@ -173,7 +173,8 @@ def _put(comm: Intracomm, path: str, size: int, offsets: NDArray[np.int64], valu
         lengths = np.diff(np.append(first, len(offsets))) * size
         where = MPI.BYTE.Create_hindexed(lengths.tolist(), offsets[first].tolist()).Commit()
     except Exception as error:
-        failed = f"process {comm.rank}: {str(error) or type(error).__name__}"
+        said = error.strerror if isinstance(error, OSError) else str(error)
+        failed = f"process {comm.rank}: {said or type(error).__name__}"
     failed = _first(comm, failed)
     if failed is not None:
         return failed

@@ -49,6 +49,8 @@ class Own:
 
 
 def _abaqus(_: bytes, text: str) -> Format | None:
+    if text.startswith("* FLAC3D"):
+        return None
     return Format("abaqus") if re.match(r"\*(\*| *[A-Za-z]{3})", text) else None
 
 
@@ -138,6 +140,8 @@ def _of_meshio(text: str) -> Format | None:
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
     if re.match(r"(?:%[^\n]*\n\s*)*(?:NDIME|NZONE|NELEM|NPOIN)\s*=", text):
         return Format("su2")
+    if text.startswith("* FLAC3D"):
+        return Format("flac3d")
     if _UCD.match(text):
         return Format("avsucd")
     return Format("off") if re.match(r"(?:ST)?(?:C)?(?:N)?OFF\b", text) else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -183,6 +184,8 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
 def _writable(form: Format, target: str) -> Format:
     if form.name == "gmsh":  # meshio leaves out entities that own no node, and gmsh does not open that
         raise WriteError(f"{target}: files of gmsh 4.1 are written back, but not made of others; use --format gmsh22")
+    if form.name == "ugrid" and not re.search(r"\.l?[br](?:4|8)l?\.ugrid$", target):  # meshio writes numpy's repr
+        raise WriteError(f"{target}: text files of UGRID cannot be written; name a .b8.ugrid")
     if form.name not in formats.writers():
         raise WriteError(f"{target}: the format {form.name} cannot be written")
     return form

@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 from commands import error_line, run
-from shapes import plate
+from shapes import block, plate
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
@@ -140,3 +140,16 @@ def test_words_of_libraries_do_not_reach_the_user(tmp_path: Path) -> None:
     meshio.Mesh(points, quads).write(tmp_path / "in.vtk")
     line = error_line("untangle", tmp_path / "in.vtk", tmp_path / "o.su2")
     assert line.endswith("cannot be written as su2 (meshio cannot make sense of it)")
+
+
+def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:
+    points, cells = plate()
+    meshio.Mesh(points, [("triangle", cells)]).write(tmp_path / "in.vtk")
+    for name, words in (("o.ugrid", "name a .b8.ugrid"), ("o.node", "the format tetgen cannot be written")):
+        assert words in error_line("untangle", "--dry-run", tmp_path / "in.vtk", tmp_path / name)
+
+
+def test_flac3d_is_not_abaqus(tmp_path: Path) -> None:
+    points, cells = block()
+    meshio.Mesh(points, [("tetra", cells)]).write(tmp_path / "in.f3grid")
+    assert read(tmp_path / "in.f3grid").format.name == "flac3d"

@@ -26,6 +26,11 @@ class WriteError(MeshfixError):
     """The result cannot be written; nothing was."""
 
 
+def on_one_line(error: object) -> str:
+    """Return on one line what another library says of an error."""
+    return " ".join(str(error).split())
+
+
 @contextmanager
 def naming(name: str) -> Iterator[None]:
     """Let errors begin with the name of the file that they are about."""

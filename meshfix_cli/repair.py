@@ -12,6 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 from meshfix_cli.errors import WriteError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import SMOOTH, plan
 
@@ -92,21 +93,24 @@ class Files:
         self, document: Document, mesh: Mesh, output: Format, put: Put | None = None
     ) -> tuple[Mesh, tuple[str, ...]]:
         """Write a moved mesh; return it as the file holds it, and what the user should know."""
-        from meshfix_cli.meshfile.writing import write
+        from meshfix_cli.meshfile.writing import unknown_extension, write
 
         if self.dry_run:
             return document.as_stored(mesh), ()
+        unknown = unknown_extension(document, self.target) if self.form is None else None
+        as_input = f"{self.target}: the extension {unknown} is not known, so it is written as {output.reader}"
+        notes = (as_input,) if unknown else ()
         stored, dropped = write(document, mesh, self.target, output, self.backup, put)
         if document.is_kept_by(output):
-            return stored, ()
+            return stored, notes
         if document.is_as_read(stored, output):
-            return stored, ()
+            return stored, notes
         lost = f"; dropped: {_listed(dropped)}" if dropped else ""
         if output.reader != document.format.reader:
-            return stored, (f"converted from {document.format.name} to {output.name}{lost}",)
+            return stored, (*notes, f"converted from {document.format.name} to {output.name}{lost}")
         if not lost and (document.source.data is None or b"\0" in document.source.data):
             lost = ": what it does not know of the input is lost"
-        return stored, (f"written anew as {output.name} by meshio{lost}",)
+        return stored, (*notes, f"written anew as {output.name} by meshio{lost}")
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -270,4 +274,5 @@ def _what_happened(document: Document, method: Method, outcome: Outcome, after: 
     kind = document.source.points.dtype.name
     way_out = "; --double stores them as they are" if kind == "float32" else ""
     written = "" if after is outcome.after else ", so the mesh before that is written"
-    return (f"positions rounded to the file's {kind} invert {rounded:,} elements{written}{way_out}",)
+    inverted = counted(rounded, "element", "elements")
+    return (f"positions rounded to the file's {kind} invert {inverted}{written}{way_out}",)

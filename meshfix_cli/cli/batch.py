@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from meshfix_cli.cli.files import check_input, check_other
+from meshfix_cli.cli.names import FILE, FOLDER, REPORT_ON_MANY
 from meshfix_cli.cli.options import (
     Show,
     allowing,
@@ -64,8 +65,6 @@ class _Listed:
         """Inputs and outputs, checked before any work."""
         from meshfix_cli.workers.batch import distinct, expanded, named_in, outputs
 
-        if self.report is not None and Path(self.report).suffix.lower() in (".html", ".htm"):
-            raise click.UsageError(f"{self.report}: the report on many meshes is JSON")
         if self.files_from is not None:
             check_input(self.files_from)
         try:
@@ -131,11 +130,22 @@ class _Run:
 _listing = packed(
     "listed",
     _Listed,
-    click.argument("sources", metavar="[IN]...", nargs=-1),
-    click.option("--output-dir", metavar="DIR", required=True, help="Outputs go here, under the names of the inputs."),
-    click.option("--files-from", metavar="FILE|-", help="Read names of more inputs, one a line."),
+    click.argument("sources", metavar="[IN]...", nargs=-1, type=FILE),
+    click.option(
+        "--output-dir",
+        type=FOLDER,
+        metavar="DIR",
+        required=True,
+        help="Outputs go here, under the names of the inputs.",
+    ),
+    click.option("--files-from", type=FILE, metavar="FILE|-", help="Read names of more inputs, one a line."),
     click.option("--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),
-    click.option("--report", metavar="FILE", help="Write the options, and each mesh before and after, as JSON."),
+    click.option(
+        "--report",
+        type=REPORT_ON_MANY,
+        metavar="FILE.json",
+        help="Write the options, and each mesh before and after, as JSON.",
+    ),
 )
 _running = packed(
     "where",
@@ -147,7 +157,7 @@ _running = packed(
         show_default=True,
         help="Processes on this machine, those that mpiexec has started, or the workers of a Dask cluster.",
     ),
-    click.option("--scheduler-file", metavar="FILE", help="Of the Dask cluster."),
+    click.option("--scheduler-file", type=FILE, metavar="FILE", help="Of the Dask cluster."),
     click.option(
         "--jobs",
         type=click.IntRange(1, 1024),
@@ -156,7 +166,7 @@ _running = packed(
 )
 
 
-@click.command()
+@click.command(short_help="Untangle many meshes at once.")
 @_listing
 @_running
 @click.option("--resume", is_flag=True, help="Skip a file whose output is not older, and valid.")

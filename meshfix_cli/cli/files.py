@@ -73,8 +73,6 @@ def check_other(name: str, *meshes: str) -> None:
 
     if name == "-" or _is_stdout(name):
         raise click.UsageError("only the mesh can go to stdout; name a file")
-    if not name:
-        raise click.UsageError("the name of a file is empty")
     path = Path(name)
     for other in (Path(mesh) for mesh in meshes if mesh != "-"):
         if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import partial, wraps
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.files import given
+from meshfix_cli.cli.names import CELLS, FILE, PAGE, PLOT
 from meshfix_cli.cli.process import cores
+from meshfix_cli.quality.metrics import NUMBERS
 from meshfix_cli.repair import Files, Held, Judge, Method
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
@@ -20,9 +21,6 @@ from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESH
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
     from meshfix_cli.report.facts import Report
-
-# Shells complete it; whether it exists and can be read, its reader tells: what is replaced need not be readable.
-FILE = click.Path(allow_dash=True, readable=False)
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]
@@ -111,6 +109,10 @@ class Show:
     quiet: bool
     threads: int = 1
 
+    def __post_init__(self) -> None:
+        if self.quiet and self.as_json:
+            raise click.UsageError("--quiet and --json exclude each other")
+
     def judge(self, draw: Draw, requirements: tuple[Requirement, ...] = ()) -> Judge:
         """Return what is to be found out: little where nothing is shown."""
         return Judge(self.metrics, requirements, self.threads, brief=self.quiet and not draw.names)
@@ -137,8 +139,6 @@ class Draw:
 
     def check(self) -> None:
         """Find out before any work whether they can be made."""
-        if self.page is not None and Path(self.page).suffix.lower() == ".json":
-            raise click.UsageError(f"{self.page}: --report writes a page in HTML; --json prints the report as JSON")
         if self.plot is not None:
             from meshfix_cli.report.plot import check_plot
 
@@ -275,10 +275,12 @@ solving = packed(
 drawing = packed(
     "draw",
     Draw,
-    click.option("--report", "page", metavar="FILE.html", help="Write the report as a page with pictures."),
-    click.option("--plot", metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
+    click.option("--report", "page", type=PAGE, metavar="FILE.html", help="Write the report as a page with pictures."),
+    click.option("--plot", type=PLOT, metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
 )
-drawing_cells = click.option("--cells", metavar="FILE", help="Write a .vtu or .vtk with the quality of each element.")
+drawing_cells = click.option(
+    "--cells", type=CELLS, metavar="FILE", help="Write a .vtu or .vtk with the quality of each element."
+)
 allowing = click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
 requiring = click.option(
     "--require",
@@ -287,5 +289,5 @@ requiring = click.option(
     multiple=True,
     metavar="CONDITION",
     help="What else a result must meet, such as 'min_angle >= 5', or exit with 3 (a batch: 4); may be given more "
-    "than once.",
+    f"than once. Compares {', '.join(NUMBERS)}, or the worst value of a --metric, by >=, <=, >, < or ==.",
 )

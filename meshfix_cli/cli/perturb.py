@@ -10,7 +10,7 @@ from meshfix_cli.repair import Files, Held
 from meshfix_cli.solve.perturb import Distance
 
 
-@click.command()
+@click.command(short_help="Tangle a mesh: move some interior vertices at random.")
 @writing
 @click.option("--percent", type=PERCENT, required=True, help="Of all vertices; interior ones move.")
 @click.option("--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")

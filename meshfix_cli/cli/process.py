@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import click
 
 from meshfix_cli.errors import MeshfixError
+from meshfix_cli.report.plain import plain
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -74,6 +75,11 @@ class Group(click.Group):
             _print_no_more()
             fail(_in_words(error))
 
+    def make_context(self, *arguments: Any, **more: Any) -> click.Context:
+        """Read the command line."""
+        with _in_plain_words():
+            return super().make_context(*arguments, **more)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):  # read when numpy and scipy are loaded, later
@@ -82,7 +88,8 @@ class Group(click.Group):
             if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) != signal.SIG_IGN:  # as nohup does
                 signal.signal(getattr(signal, name), _stop)
         try:
-            return super().invoke(ctx)
+            with _in_plain_words():
+                return super().invoke(ctx)
         except MeshfixError as error:
             fail(str(error))
         except MemoryError:
@@ -105,6 +112,17 @@ def _print_no_more() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+@contextmanager
+def _in_plain_words() -> Iterator[None]:
+    """Let what click says of wrong usage be one line that does not act on a terminal, whatever the user wrote."""
+    try:
+        yield
+    except click.UsageError as error:
+        if isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):  # it is the help that it shows
+            raise
+        raise click.UsageError(plain(error.format_message()), error.ctx) from error
+
+
 def _stop(number: int, frame: object) -> NoReturn:
     """End, where there is something to clear up through every `finally`; a second signal must not disturb that.
 
@@ -124,7 +142,7 @@ def _stop(number: int, frame: object) -> NoReturn:
 
 def complain(message: str) -> None:
     """Print an error, on one line of stderr."""
-    click.echo(f"meshfix: error: {' '.join(message.split())}", err=True)
+    click.echo(f"meshfix: error: {plain(message)}", err=True)
 
 
 def fail(message: str) -> NoReturn:

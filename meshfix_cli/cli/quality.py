@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from meshfix_cli.cli.files import check_input, check_others, given, write_cells
-from meshfix_cli.cli.options import FILE, Draw, Show, drawing, drawing_cells, holding, reporting, requiring
+from meshfix_cli.cli.names import FILE
+from meshfix_cli.cli.options import Draw, Show, drawing, drawing_cells, holding, reporting, requiring
 from meshfix_cli.cli.process import ERROR, INVERTED, SOME_FAILED, VALID, complain
 from meshfix_cli.errors import MeshfixError
 from meshfix_cli.repair import Held
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
 
 
-@click.command()
+@click.command(short_help="Report the quality of meshes, and where elements are inverted.")
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True, type=FILE)
 @drawing_cells
 @drawing
@@ -34,11 +35,7 @@ def quality(
     held: Held,
     show: Show,
 ) -> None:
-    """Report the quality of meshes, and where elements are inverted. One unreadable mesh does not stop the others.
-
-    A CONDITION compares a number of the JSON report (inverted, folded, min_measure, min_angle, max_angle,
-    mean_min_angle, percentile_1), or the worst value of a --metric, by >=, <=, >, < or ==.
-    """
+    """Report the quality of meshes, and where elements are inverted. One unreadable mesh does not stop the others."""
     beside = given(cells, *draw.names)
     if beside and len(sources) > 1:
         raise click.UsageError("--cells, --report and --plot take one INPUT")

@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.files import open_files, report_stream, write_cells
+from meshfix_cli.cli.names import HISTORY
 from meshfix_cli.cli.options import (
     Draw,
     Show,
@@ -31,10 +32,10 @@ if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
 
 
-@click.command()
+@click.command(short_help="Move interior vertices until no element is inverted.")
 @writing
 @solving
-@click.option("--history", metavar="FILE", help="Write a CSV line for each sweep.")
+@click.option("--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells
 @drawing
 @allowing
@@ -61,7 +62,6 @@ def untangle(
     Strategies: auto (Laplacian sweeps, the linear programme on stars that are still invalid, then FF where that is not
     enough), FF (the foldover-free energy, minimised over all vertices at once), and the paper's LS (Laplacian), US
     (linear programme), CS (both for each vertex), LUS (3 Laplacian sweeps, then the programme).
-    For CONDITION see `meshfix quality --help`.
     """
     from meshfix_cli.meshfile.atomic import write_text
     from meshfix_cli.meshfile.writing import check_cells

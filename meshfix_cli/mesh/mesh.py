@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.mesh.topology import Topology, build_topology, read_only
 
 _T = TypeVar("_T", bound=np.generic)
@@ -151,7 +152,8 @@ def _checked_simplices(
     outside, repeated = kernels.check_simplices(rows, n, threads)
     if outside >= 0:
         named = simplices[outside].tolist()
-        raise InvalidMeshError(f"element {outside} refers to vertices {named}, but there are {n} points")
+        there = f"there {'is' if n == 1 else 'are'} {counted(n, 'point', 'points')}"
+        raise InvalidMeshError(f"element {outside} refers to vertices {named}, but {there}")
     if repeated >= 0:
         raise InvalidMeshError(f"element {repeated} names a vertex twice: {simplices[repeated].tolist()}")
     return rows

@@ -180,7 +180,8 @@ def build(
         if key not in REGIONS and key != regions and not _are_labels(labels):
             continue
         if labels.ndim != 1:
-            raise ReadError(f"the cell data {key!r} are not labels of regions: they have {labels.shape[1]} components")
+            components = counted(labels.shape[1], "component", "components")
+            raise ReadError(f"the cell data {key!r} are not labels of regions: they have {components}")
         reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, simplices, topology))
     fixed = {}
     if copies is not None:
@@ -279,7 +280,7 @@ def _solved_points(
     with np.errstate(invalid="ignore"):  # a signalling NaN; Mesh.build tells where there is any
         points = np.asarray(source.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or points.shape[1] < dimension:
-        raise ReadError(f"its points have {points.shape[-1]} coordinates")
+        raise ReadError(f"its points have {counted(points.shape[-1], 'coordinate', 'coordinates')}")
     if points.shape[1] == dimension:
         return points, None
     flat = np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
@@ -358,7 +359,7 @@ def _notes(mesh: Mesh, rows: int, seen_from_above: bool, copies: NDArray[np.int6
         notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
     mirrored, which = int(topology.mirrored.sum()), ""
     if mirrored == topology.m and seen_from_above:
-        which = "the elements are"
+        which = "the element is" if mirrored == 1 else "the elements are"
     elif 0 < mirrored < topology.m:
         which = counted(mirrored, f"{one} in a separate part is", f"{many} in separate parts are")
     if which:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.text import integers, integers_at, words
@@ -125,7 +126,7 @@ def _section(text: bytes, name: str, at: int, dimension: int) -> _Section:
         return _Section(name, at, at)
     count, begin = _integer(text, at)
     if not 0 <= count * columns <= len(text) - begin:
-        raise ReadError(f"is truncated: {name} announces {count:,} rows")
+        raise ReadError(f"is truncated: {name} announces {counted(count, 'row', 'rows')}")
     if name == "Vertices":
         spans = words(text, begin, count * columns)
         return _Section(name, begin, int(spans.max(initial=begin)), spans.reshape(count, columns, 2))

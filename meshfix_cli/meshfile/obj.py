@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.text import Spans, first_words, in_line, integers_at, line_words
@@ -50,7 +51,8 @@ def parse(data: bytes) -> Source:
         for rows, spans in _runs(data, at[keyword]):
             count = spans.shape[1]
             if count < minimum:
-                raise in_line(data, int(at[keyword][rows[0]]), f"a {_NAMES[keyword]} of {count} vertices")
+                what = f"a {_NAMES[keyword]} of {counted(count, 'vertex', 'vertices')}"
+                raise in_line(data, int(at[keyword][rows[0]]), what)
             before = np.searchsorted(at[b"v"], at[keyword][rows])
             vertices = _vertices(data, spans, before, len(at[b"v"]))
             if keyword == b"p":  # as many cells as there are numbers

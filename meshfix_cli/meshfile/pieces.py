@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, WriteError, naming
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.atomic import check_target, is_stream
 from meshfix_cli.meshfile.joining import Copies, Int64, by_numbers, by_place, joined
 from meshfix_cli.meshfile.source import Arrays, Cells, Family, Source, ghost_vertices
@@ -109,7 +110,8 @@ def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:
     cells = [_some(run, here) for run, here in zip(cells, kept, strict=True)]
     common = int((np.bincount(rows) > 1).sum())
     how = "equal coordinates" if numbers is None else family.numbers
-    note = f"joined {len(sources)} files at {common:,} common points, by {how}"
+    files, points_of_several = counted(len(sources), "file", "files"), counted(common, "common point", "common points")
+    note = f"joined {files} at {points_of_several}, by {how}"
     return Source(
         points[chosen],
         cells,

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply, pairs
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
@@ -378,4 +379,5 @@ def _untold(header: _Header) -> tuple[str, ...]:
 
 
 def _truncated(element: _Element) -> ReadError:
-    return ReadError(f"is truncated: it announces {element.rows:,} rows of the element {element.name!r}")
+    rows = counted(element.rows, "row", "rows")
+    return ReadError(f"is truncated: it announces {rows} of the element {element.name!r}")

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, Places, Points, apply, differing
 from meshfix_cli.meshfile.text import Spans, first_words, in_line, line_words
@@ -88,7 +89,8 @@ def parse(data: bytes) -> Source:
     if _SOLID.match(data) and b"\0" not in data[:_HEAD]:
         return _parse_text(data)
     if len(data) >= _HEAD and missing > 0:
-        raise ReadError(f"is truncated: it announces {facets:,} facets, for which {missing:,} bytes are missing")
+        lacking = counted(missing, "byte is missing", "bytes are missing")
+        raise ReadError(f"is truncated: it announces {counted(facets, 'facet', 'facets')}, for which {lacking}")
     raise ReadError("is not a readable stl file: it is neither text nor as long as its number of facets says")
 
 

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 
 Spans = NDArray[np.int64]  # (..., 2): the offset of the first byte of a word, and the offset behind its last
 
@@ -23,7 +24,8 @@ def words(data: bytes, at: int, count: int) -> Spans:
     """
     spans = kernels.find_words(data, at, count)
     if len(spans) < count:
-        raise in_line(data, at, f"{count:,} numbers are announced, and the file is truncated")
+        announced = counted(count, "number is announced", "numbers are announced")
+        raise in_line(data, at, f"{announced}, and the file is truncated")
     return spans
 
 

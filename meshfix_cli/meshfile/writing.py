@@ -24,6 +24,7 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
 from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing
 
 Put = Callable[[Path, Places, Points, NDArray[np.bool_]], None]
+_WITH_CELLS = ("vtu", "vtk")  # what programs draw data of cells from
 ROUNDING = 1e-4  # relative to the size of the mesh: more than any format rounds, less than any mesh can bear
 
 
@@ -139,9 +140,15 @@ def write_cells(
 def check_cells(document: Document, target: str) -> Format:
     """Return the format of a file for `write_cells`; WriteError where that does not hold the data."""
     form = output_format(document, target)
-    if form.reader not in ("vtk", "vtu"):
-        raise WriteError(f"{target}: quality can be drawn from .vtu and .vtk files, and this would be {form.name}")
+    if form.reader not in _WITH_CELLS:
+        known = " and ".join(cells_extensions())
+        raise WriteError(f"{target}: quality can be drawn from {known} files, and this would be {form.name}")
     return form
+
+
+def cells_extensions() -> tuple[str, ...]:
+    """Return the extensions of the files that `write_cells` makes."""
+    return tuple(extension for name in _WITH_CELLS for extension in formats.OWN[name].extensions)
 
 
 def check_pieces(document: Document, target: str, form: Format) -> None:
@@ -179,6 +186,14 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
     if form.binary is None and form.name in formats.BOTH:
         form = Format(form.name, bool(document.format.binary))
     return document.format if form == document.format else _writable(form, target)
+
+
+def unknown_extension(document: Document, target: str) -> str | None:
+    """Return the extension of a target, as written, if it names no format and is not that of the input."""
+    extension = Path(target).suffix
+    if not extension or extension == Path(document.name).suffix or formats.by_name(Path(target)) is not None:
+        return None
+    return extension
 
 
 def _writable(form: Format, target: str) -> Format:

@@ -23,6 +23,11 @@ class Metric:
     worst: Literal["min", "max"]
 
 
+# What the report prints of every mesh: fields of `summary.Summary`, which a requirement can name beside the metrics.
+NUMBERS = (
+    "elements", "inverted", "folded", "min_measure", "min_angle", "max_angle", "mean_min_angle", "percentile_1",
+)  # fmt: skip
+
 METRICS = {
     "min_angle": Metric("min"),  # degrees, without sign; dihedral for tetrahedra
     "min_sine": Metric("min"),  # equation (3.2), with the sign of the measure

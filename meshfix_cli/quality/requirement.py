@@ -5,17 +5,14 @@ from __future__ import annotations
 import operator
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
-from meshfix_cli.quality.metrics import METRICS
+from meshfix_cli.quality.metrics import METRICS, NUMBERS
 from meshfix_cli.quality.summary import Summary
 
 RELATIONS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge, "<=": operator.le, "==": operator.eq, ">": operator.gt, "<": operator.lt,
 }  # fmt: skip
-
-# What a requirement can name beside the metrics: what the report prints of a mesh.
-NUMBERS = tuple(field.name for field in fields(Summary) if field.type in ("int", "float"))
 
 
 @dataclass(frozen=True)
@@ -25,7 +22,7 @@ class Requirement:
     Attributes
     ----------
     name : str
-        A number of `Summary`, or a key of `METRICS`, of which the worst value counts.
+        One of `NUMBERS`, or a key of `METRICS`, of which the worst value counts.
     relation : str
         A key of `RELATIONS`.
     bound : float

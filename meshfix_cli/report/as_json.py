@@ -8,6 +8,7 @@ from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from meshfix_cli import __version__
+from meshfix_cli.quality.metrics import NUMBERS
 from meshfix_cli.quality.summary import BIN_WIDTH, Summary
 from meshfix_cli.report.facts import Report, first_inverted
 
@@ -18,14 +19,16 @@ SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
 
 
 def to_json(report: Report) -> dict[str, Any]:
-    """Return the facts of the table under stable names; angles in degrees, times in seconds, lengths of the model."""
-    mesh = report.mesh
+    """Return the facts of the table under stable names; angles in degrees, times in seconds, lengths of the model.
+
+    The numbers of the result stand at the top, and among those of all stages under "quality".
+    """
+    mesh, result = report.mesh, report.result
     return {
         "schema": SCHEMA,
         "command": report.command,
         "file": report.name,
         "dimension": mesh.dimension,
-        "elements": mesh.topology.m,
         "vertices": int(mesh.topology.used.sum()),
         "free_vertices": int(mesh.movable.sum()),
         "fixed": report.fixed,
@@ -33,6 +36,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "not_judged": dict(report.not_judged),
         "misnumbered": report.misnumbered,
         "mirrored": int(mesh.topology.mirrored.sum()),
+        **{name: getattr(result, name) for name in NUMBERS},
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
         "first_inverted": [{"id": i, "centroid": c} for i, c in first_inverted(report)],

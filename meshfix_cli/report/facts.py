@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 
 LISTED = 10  # inverted elements named in the report
 
+# By command, the words between the number of elements that are inverted and "inverted"; of others they "are".
+_BEFORE_INVERTED = {
+    "untangle": ("element remains", "elements remain"),
+    "perturb": ("element is now", "elements are now"),
+}
+
 # What can become of a file of a batch, and how it is told.
 STATUSES = {"valid": "valid", "invalid": "NOT VALID", "failed": "failed", "skipped": "skipped"}
 
@@ -154,11 +160,9 @@ def title(report: Report) -> str:
     """Return what the mesh is, in one line."""
     mesh = report.mesh
     shape, held = mesh.topology.element.shape, ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
-    vertices, free = int(mesh.topology.used.sum()), int(mesh.movable.sum())
-    return (
-        f"{report.name}: {counted(mesh.topology.m, shape.name, shape.plural)}, {vertices:,} vertices: {free:,} free"
-        + (f", fixed {held}" if held else "")
-    )
+    vertices = counted(int(mesh.topology.used.sum()), "vertex", "vertices")
+    elements, free = counted(mesh.topology.m, shape.name, shape.plural), int(mesh.movable.sum())
+    return f"{report.name}: {elements}, {vertices}: {free:,} free{f', fixed {held}' if held else ''}"
 
 
 def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
@@ -194,17 +198,20 @@ def phases(report: Report) -> Iterator[str]:
         if record.sweep and record.phase != "best":
             by_name.setdefault(record.phase, []).append(record)
     for name, records in by_name.items():
-        left, sweeps, seconds = records[-1], len(records), sum(record.seconds for record in records)
+        left, sweeps = records[-1], counted(len(records), "sweep", "sweeps")
+        seconds = sum(record.seconds for record in records)
         measure = f"smallest {report.mesh.topology.element.shape.measure} {left.min_measure:.3g}"
-        yield f"{name}: {sweeps} sweep{'s' * (sweeps > 1)}, {left.inverted:,} inverted, {measure}, {seconds:.3g} s"
+        yield f"{name}: {sweeps}, {left.inverted:,} inverted, {measure}, {seconds:.3g} s"
 
 
 def processes(report: Report) -> Iterator[str]:
     """Say of each of several processes what it held and sent."""
     for facts in (report.facts or {}).get("ranks", ()):
         memory = "" if facts["peak_mb"] is None else f", {facts['peak_mb']:,.0f} MB at most"
-        held = f"{facts['vertices']:,} vertices and {facts['ghosts']:,} ghosts"
-        yield f"{held}{memory}, sent {facts['megabytes']:.3g} MB in {facts['messages']:,} messages"
+        vertices = counted(facts["vertices"], "vertex", "vertices")
+        ghosts = counted(facts["ghosts"], "ghost", "ghosts")
+        sent = f"sent {facts['megabytes']:.3g} MB in {counted(facts['messages'], 'message', 'messages')}"
+        yield f"{vertices} and {ghosts}{memory}, {sent}"
 
 
 def verdict(report: Report, listing: bool = True) -> list[str]:
@@ -220,8 +227,8 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
     if report.not_judged:
         lines.append(f"NOT VALID: {not_judged(report)}")
     if count:
-        verb = {"untangle": "remains|remain", "perturb": "is now|are now"}.get(report.command, "is|are").split("|")
-        text = f"NOT VALID: {count:,} element{'s' * (count > 1)} {verb[count > 1]} inverted"
+        subject = _BEFORE_INVERTED.get(report.command, ("element is", "elements are"))
+        text = f"NOT VALID: {counted(count, *subject)} inverted"
         if listing:
             text += f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"
         lines.append(text)
@@ -229,11 +236,10 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
         lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in first_inverted(report)]
     lines += _impossible(report)
     if report.misnumbered:
-        first = report.ids[np.flatnonzero(report.mesh.topology.misnumbered)[: report.listed]].tolist()
-        some = ", ".join(map(str, first)) + (", ..." if report.misnumbered > len(first) else "")
-        what = "element is" if report.misnumbered == 1 else "elements are"
-        text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh (element {some})"
-        lines.append(f"{text}; untangle --fix-orientation renumbers them")
+        what, it = ("element is", "it") if report.misnumbered == 1 else ("elements are", "them")
+        which = _some(report, np.flatnonzero(report.mesh.topology.misnumbered))
+        text = f"NOT VALID: {report.misnumbered:,} {what} numbered against the rest of the mesh ({which})"
+        lines.append(f"{text}; untangle --fix-orientation renumbers {it}")
     return lines
 
 
@@ -243,7 +249,7 @@ def _impossible(report: Report) -> Iterator[str]:
     if count := len(found.inverted):
         which = _some(report, found.inverted)
         yield f"IMPOSSIBLE: {count:,} of them without a free vertex: the fixed ones are wrong ({which})"
-    if count := len(found.exclusive):
+    if count := len(found.exclusive):  # at least two
         yield (
             f"IMPOSSIBLE: {count:,} elements exclude each other: wherever the free vertex that they share goes, one of "
             f"them is inverted ({_some(report, found.exclusive)})"
@@ -257,10 +263,10 @@ def _impossible(report: Report) -> Iterator[str]:
         yield f"IMPOSSIBLE: separate parts of the mesh overlap ({_some(report, found.overlapping)})"
 
 
-def _some(report: Report, rows: NDArray[np.int32]) -> str:
+def _some(report: Report, rows: NDArray[np.integer[Any]]) -> str:
     """Name the first of some elements as the file does."""
     ids = report.ids[rows[: report.listed]].tolist()
-    return f"element{'s' * (len(rows) > 1)} {', '.join(map(str, ids))}{', ...' * (len(ids) < len(rows))}"
+    return f"{'element' if len(rows) == 1 else 'elements'} {', '.join(map(str, ids))}{', ...' * (len(ids) < len(rows))}"
 
 
 def not_judged(report: Report) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from meshfix_cli.errors import WriteError
+from meshfix_cli.errors import WriteError, on_one_line
 from meshfix_cli.quality.summary import BIN_WIDTH
 from meshfix_cli.report.facts import Report
 from meshfix_cli.report.figures import Convergence, Figures, Points, Scene, State
@@ -39,15 +39,13 @@ MOST_LINES = 5_000  # triangles: the lines of more are pixels in .svg and .pdf a
 
 
 def check_plot(target: str) -> None:
-    """Raise WriteError now, before any work, where a plot cannot be made or its format is not known."""
-    if Path(target).suffix.lower() not in METADATA:
-        raise WriteError(f"{target}: plots are written as {', '.join(METADATA)}")
+    """Raise WriteError now, before any work, where a plot cannot be made."""
     try:
         import matplotlib.figure  # noqa: F401
     except ImportError as error:
         raise WriteError(f"{target}: plots need matplotlib: pip install matplotlib") from error
     except Exception as error:  # settings of the user that it does not understand
-        raise WriteError(f"{target}: matplotlib does not start: {error}") from error
+        raise WriteError(f"{target}: matplotlib does not start: {on_one_line(error)}") from error
 
 
 def plot(report: Report, drawn: Figures, target: Path) -> None:
@@ -91,7 +89,8 @@ def _figure(report: Report, drawn: Figures) -> Figure:
             bands[0].subplots(1, pictures, squeeze=False)[0], drawn.scene.states.items(), strict=True
         ):
             _picture(axes, drawn.scene, state)
-            amber = f", amber: the worst {len(state.worst)}" if len(state.worst) else ""
+            count = len(state.worst)
+            amber = f", amber: the worst {count if count > 1 else 'one'}" if count else ""
             axes.set_title(f"{name}: {state.count:,} inverted{amber}")
     axes = bands[-1].subplots(1, charts, squeeze=False)[0]
     shape = report.mesh.topology.element.shape

@@ -28,6 +28,7 @@ from meshfix_cli.report.facts import (
     title,
     verdict,
 )
+from meshfix_cli.report.plain import plain
 
 if TYPE_CHECKING:
     from meshfix_cli.solve.records import SweepRecord
@@ -44,22 +45,23 @@ def console(stream: Any) -> Console:
 
 def print_report(report: Report, out: Console) -> None:
     """Print the quality table, the phases, the notes and a verdict in plain words."""
-
-    def line(text: str, style: str = "") -> None:
-        out.print(Text(text, style=style), soft_wrap=True)
-
-    line(title(report))
-    out.print(_quality_table(report))
+    _line(out, title(report))
+    _print_table(out, list(report.stages), _rows(report))
     for text in phases(report):
-        line(text)
+        _line(out, text)
     for rank, text in enumerate(processes(report)):
-        line(f"process {rank}: {text}")
+        _line(out, f"process {rank}: {text}")
     for note in report.notes:
-        line(f"note: {note}")
+        _line(out, f"note: {note}")
     for text in verdict(report):
-        line(text, "bold green" if report.valid else "bold red")
+        _line(out, text, "bold green" if report.valid else "bold red")
     for met, text in required(report):
-        line(text, "green" if met else "bold red")
+        _line(out, text, "green" if met else "bold red")
+
+
+def _line(out: Console, text: str, style: str = "") -> None:
+    """Print one line, which a terminal breaks where it ends."""
+    out.print(Text(plain(text), style=style), soft_wrap=True)
 
 
 def print_json(report: Report, out: Console) -> None:
@@ -72,28 +74,27 @@ def print_result(result: Mapping[str, Any], out: Console, as_json: bool) -> None
     if as_json:
         out.file.write(json.dumps(result, allow_nan=False) + "\n")
     elif result["status"] != "failed":
-        out.print(Text(_result_line(result)), soft_wrap=True)
+        _line(out, _result_line(result))
     out.file.flush()
 
 
 def print_tally(tally: Tally, seconds: float, out: Console) -> None:
     """Print the summary of a batch."""
-    table, files = Table("", "before", "after"), tally.statuses.total()
+    files = tally.statuses.total()
     if not files:
-        out.print("no file falls to this shard: nothing was done")
+        _line(out, "no file falls to this shard: nothing was done")
         return
-    for column in table.columns[1:]:
-        column.justify = "right"
-    table.add_row("files", "", f"{files:,}")
-    for status, label in STATUSES.items():
-        table.add_row(label, "", f"{tally.statuses[status]:,}")
-    table.add_row("elements", "", f"{tally.elements:,}")
-    table.add_row("inverted elements", *(f"{count:,}" for count in tally.inverted))
-    table.add_row(
-        "smallest angle of all [°]", *(f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle)
-    )
-    out.print(table)
-    out.print(Text(f"{seconds:.3g} s, {files / max(seconds, 1e-9):,.2f} files a second"))
+    counts = [(label, ["", f"{tally.statuses[status]:,}"]) for status, label in STATUSES.items()]
+    angles = [f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle]
+    rows = [
+        ("files", ["", f"{files:,}"]),
+        *counts,
+        ("elements", ["", f"{tally.elements:,}"]),
+        ("inverted elements", [f"{count:,}" for count in tally.inverted]),
+        ("smallest angle of all [°]", angles),
+    ]
+    _print_table(out, ["before", "after"], rows)
+    _line(out, f"{seconds:.3g} s, {files / max(seconds, 1e-9):,.2f} files a second")
 
 
 def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> Iterator[dict[str, Any]]:
@@ -101,11 +102,12 @@ def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> 
     if not out.is_terminal:
         yield from results
         return
-    with out.status(f"0 of {total:,} files") as status:
+    files = counted(total, "file", "files")
+    with out.status(f"0 of {files}") as status:
         for done, result in enumerate(results, 1):
             status.stop()
             yield result
-            status.update(f"{done:,} of {total:,} files")
+            status.update(f"{done:,} of {files}")
             status.start()
 
 
@@ -125,7 +127,7 @@ def with_progress(
             if status is not None:
                 status.update(text)
             if every_sweep:
-                out.print(Text(f"{text}, {record.moved:,} vertices moved, {record.seconds:.3g} s"), soft_wrap=True)
+                _line(out, f"{text}, {counted(record.moved, 'vertex', 'vertices')} moved, {record.seconds:.3g} s")
             yield mesh, record
 
 
@@ -151,16 +153,37 @@ def _result_line(result: Mapping[str, Any]) -> str:
     return ", ".join([*parts, f"{result['seconds']:.3g} s"])
 
 
-def _quality_table(report: Report) -> Table:
-    table = Table("")
-    for stage in report.stages:
-        table.add_column(stage, justify="right")
-    for label, values in quality_rows(report):
-        table.add_row(label, *values)
-    bars = (_bars(summary.histogram) for summary in report.stages.values())
+def _rows(report: Report) -> list[tuple[str, list[str]]]:
+    """Return the rows of the quality table, and one of histograms."""
+    bars = [_bars(summary.histogram) for summary in report.stages.values()]
     width = len(report.result.histogram) * BIN_WIDTH
-    table.add_row(f"smallest angles, 0 to {width:.0f}°", *bars)
-    return table
+    return [*quality_rows(report), (f"smallest angles, 0 to {width:.0f}°", bars)]
+
+
+def _print_table(out: Console, columns: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> None:
+    """Print rows of a label and values; where a terminal is too narrow for that, as a list.
+
+    Labels are broken between words; half a number is another number, so values never are.
+    """
+    widths = [max(map(len, cells)) for cells in zip(columns, *(values for _, values in rows), strict=True)]
+    longest_word = max(len(word) for label, _ in rows for word in label.split())
+    if longest_word + sum(widths) + 3 * len(columns) + 4 > out.width:
+        _print_list(out, columns, rows)
+        return
+    table = Table("")
+    for column, width in zip(columns, widths, strict=True):
+        table.add_column(column, justify="right", no_wrap=True, min_width=width)
+    for label, values in rows:
+        table.add_row(label, *values)
+    out.print(table)
+
+
+def _print_list(out: Console, columns: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> None:
+    for label, values in rows:
+        out.print(Text(label))
+        for column, value in zip(columns, values, strict=True):
+            if value:
+                _line(out, f"  {column}: {value}")
 
 
 def _bars(histogram: Sequence[int]) -> str:

@@ -111,11 +111,13 @@ def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH, only_invalid: bo
 
     Raises
     ------
-    KeyError, ValueError
+    ValueError
         There is no such strategy, or no such smoothing.
     """
     if smooth != "best" and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
         raise ValueError(f'smooth is {smooth!r}, and must be a number of passes or "best"')
+    if strategy not in STRATEGIES:
+        raise ValueError(f"strategy is {strategy!r}, and must be one of {', '.join(STRATEGIES)}")
     untangling = STRATEGIES[strategy]
     if only_invalid:
         untangling = tuple(region for phase in untangling for region in _in_regions(phase))

@@ -388,7 +388,7 @@ def untangle(
 
     Raises
     ------
-    KeyError, ValueError
+    ValueError
         There is no such strategy, or an argument is out of range.
 
     Notes

@@ -25,7 +25,7 @@ from multiprocessing import connection
 from pathlib import Path
 from typing import Any
 
-from meshfix_cli.errors import MeshfixError, ReadError
+from meshfix_cli.errors import MeshfixError, ReadError, on_one_line
 from meshfix_cli.meshfile.reading import pieces_of
 from meshfix_cli.repair import Files, Held, Judge, Method, repair
 from meshfix_cli.report.as_json import SCHEMA, to_json
@@ -244,7 +244,7 @@ def _alone(executor: Executor, task: Task, function: Callable[[Task], Result]) -
     error = _error(future)
     if error is None:
         return future.result()
-    text = f"{type(error).__name__}, twice: {error}"
+    text = f"{type(error).__name__}, twice: {on_one_line(error)}"
     if isinstance(error, BrokenExecutor):
         text = "the worker died, twice (out of memory?)"
     elif isinstance(error, CancelledError):

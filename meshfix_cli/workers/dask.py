@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshfix_cli.errors import MeshfixError
+from meshfix_cli.errors import MeshfixError, on_one_line
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -33,7 +33,7 @@ def workers(scheduler_file: str) -> Iterator[tuple[Executor | None, int]]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise MeshfixError(f"Dask is not installed: pip install 'meshfix-cli[dask]' ({error})") from error
+        raise MeshfixError(f"Dask is not installed: pip install 'meshfix-cli[dask]' ({on_one_line(error)})") from error
     for name in ("distributed", "distributed.client"):  # they log what is told below, with tracebacks
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
@@ -45,7 +45,7 @@ def workers(scheduler_file: str) -> Iterator[tuple[Executor | None, int]]:
     try:
         client = Client(address)
     except (OSError, ValueError) as error:
-        raise MeshfixError(f"{scheduler_file}: no Dask scheduler answers at {address}: {error}") from error
+        raise MeshfixError(f"{scheduler_file}: no Dask scheduler answers at {address}: {on_one_line(error)}") from error
     with client:  # at its end the scheduler forgets what was not begun
         yield _Cluster(client), sum(client.nthreads().values())
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.errors import MeshfixError
+from meshfix_cli.errors import MeshfixError, on_one_line
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import Topology
 from meshfix_cli.quality.obstacles import find_obstacles
@@ -186,7 +186,7 @@ def _put(comm: Intracomm, path: str, size: int, offsets: NDArray[np.int64], valu
         finally:
             file.Close()
     except MPI.Exception as error:
-        failed = error.Get_error_string()
+        failed = on_one_line(error.Get_error_string())
     where.Free()
     return _first(comm, failed)
 

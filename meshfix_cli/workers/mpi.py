@@ -11,7 +11,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, NoReturn, cast
 
-from meshfix_cli.errors import MeshfixError
+from meshfix_cli.errors import MeshfixError, on_one_line
 
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
@@ -40,7 +40,8 @@ def world(launched: int | None = None) -> Intracomm:
             from mpi4py import MPI
     except ImportError as error:
         raise MeshfixError(
-            f"MPI needs mpi4py and an MPI library: pip install 'meshfix-cli[mpi]' mpich, or the cluster's own ({error})"
+            f"MPI needs mpi4py and an MPI library: pip install 'meshfix-cli[mpi]' mpich, or the cluster's own "
+            f"({on_one_line(error)})"
         ) from error
     except RuntimeError as error:
         raise MeshfixError("mpi4py finds no MPI library: load the cluster's own, or pip install mpich") from error

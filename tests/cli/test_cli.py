@@ -188,8 +188,10 @@ def test_cells_say_where(tmp_path: Path) -> None:
 
 def test_cells_need_a_format_that_holds_them(tmp_path: Path) -> None:
     for command in (["quality"], ["untangle", tmp_path / "o.vtk"]):
-        line = error_line(command[0], "--cells", tmp_path / "cells.obj", TANGLED, *command[1:])
-        assert "quality can be drawn from .vtu and .vtk files, and this would be obj" in line
+        line = error_line(command[0], "--cells", tmp_path / "cells.obj", TANGLED, *command[1:], code=2)
+        assert "the name of a file of cells ends in .vtu or .vtk" in line
+    line = error_line("quality", "--cells", tmp_path / "cells", SAMPLES / "two_materials.msh")
+    assert "quality can be drawn from .vtu and .vtk files, and this would be gmsh22" in line
     assert "name a file" in error_line("quality", "--cells", "-", TANGLED, code=2)
     assert "is the name of a mesh" in error_line("quality", "--cells", TANGLED, TANGLED, code=2)
     assert "take one INPUT" in error_line("quality", "--cells", tmp_path / "c.vtu", TANGLED, VALID, code=2)
@@ -239,7 +241,7 @@ def test_orientation_is_mended_where_asked(tmp_path: Path) -> None:
     mesh.write(tmp_path / "in.vtk", file_format="vtk42", binary=False)
     text = run("quality", tmp_path / "in.vtk", code=3).stdout.decode()
     assert "NOT VALID: 1 element is numbered against the rest of the mesh (element 3)" in text
-    assert "--fix-orientation renumbers them" in text
+    assert "--fix-orientation renumbers it" in text
     text = run("untangle", "--fix-orientation", tmp_path / "in.vtk", tmp_path / "out.vtk").stdout.decode()
     assert "note: renumbered 1 triangle" in text
     before, after = (set((tmp_path / name).read_bytes().split(b"\n")) for name in ("in.vtk", "out.vtk"))

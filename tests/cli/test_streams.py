@@ -45,11 +45,11 @@ def test_targets_that_cannot_be_written(tmp_path: Path) -> None:
 def test_history_never_replaces_a_mesh(tmp_path: Path) -> None:
     mesh = tmp_path / "in.vtk"
     mesh.write_bytes(Path(TANGLED).read_bytes())
-    assert "is the name of a mesh" in error_line("untangle", "--history", mesh, mesh, tmp_path / "o.vtk", code=2)
-    assert "is the name of a mesh" in error_line("untangle", "--history", mesh, TANGLED, mesh, code=2)
-    (tmp_path / "link.csv").hardlink_to(mesh)
-    line = error_line("untangle", "--history", tmp_path / "link.csv", mesh, tmp_path / "o.vtk", code=2)
-    assert "is the name of a mesh" in line
+    link = tmp_path / "link.csv"
+    link.hardlink_to(mesh)
+    assert "is the name of a mesh" in error_line("untangle", "--history", link, mesh, tmp_path / "o.vtk", code=2)
+    assert "is the name of a mesh" in error_line("untangle", "--history", link, TANGLED, mesh, code=2)
+    assert "is the name of a mesh" in error_line("untangle", "--history", link, TANGLED, link, code=2)
     twice = ["--history", tmp_path / "x", "--cells", tmp_path / "x"]
     assert "of another file to be written" in error_line("untangle", *twice, mesh, tmp_path / "o.vtk", code=2)
     assert mesh.read_bytes() == Path(TANGLED).read_bytes()

@@ -180,11 +180,13 @@ def test_a_file_whose_name_has_a_star_is_a_file(tmp_path: Path) -> None:
 
 
 def test_no_other_file_takes_the_place_of_a_part_of_the_output(tmp_path: Path) -> None:
+    """Parts may have names with any extension, or none."""
     pattern, _ = by_gmsh(tmp_path, "boxes", 4.1, 0)
     before = set(tmp_path.iterdir())
-    part = parts(pattern)[0].name.replace("in_", "out_")
-    for beside in (["--history", tmp_path / part], ["--backup", "--history", tmp_path / f"{part}.bak"]):
-        run("untangle", "-q", *beside, pattern, tmp_path / "out_*.msh", code=2)
+    part = parts(pattern)[0].stem.replace("in_", "out_")
+    for names, beside in (("out_*", part), ("out_*.csv", f"{part}.csv"), ("out_*", f"{part}.bak.csv")):
+        error = run("untangle", "--backup", "--history", tmp_path / beside, pattern, tmp_path / names, code=2).stderr
+        assert b"is the name of a mesh" in error or b"may be the name of the backup" in error
     assert set(tmp_path.iterdir()) == before
 
 

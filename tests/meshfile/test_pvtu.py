@@ -375,8 +375,8 @@ def test_no_piece_of_the_input_is_replaced_but_in_place(tmp_path: Path) -> None:
     path = made(tmp_path, names="out_{i}.vtu")
     for target in ("out.pvtu", "out_1.vtu"):
         assert "name another OUTPUT" in error_line("untangle", path, tmp_path / target)
-    assert "name of a mesh" in run("untangle", "--history", tmp_path / "out_1.vtu", path, path, code=2).stderr.decode()
-    beside = "--history", tmp_path / "new_1.vtu", path, tmp_path / "new.pvtu"
+    assert "name of a mesh" in run("untangle", "--cells", tmp_path / "out_1.vtu", path, path, code=2).stderr.decode()
+    beside = "--cells", tmp_path / "new_1.vtu", path, tmp_path / "new.pvtu"
     assert "name of a mesh" in run("untangle", *beside, code=2).stderr.decode()
     assert "name of a mesh" in run("quality", "--cells", tmp_path / "out_1.vtu", path, code=2).stderr.decode()
     assert len(list(tmp_path.iterdir())) == 4

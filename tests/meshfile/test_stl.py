@@ -198,10 +198,10 @@ def test_truncated_files(variant: str, tmp_path: Path) -> None:
         (TEXT.replace(b"normal 0 0 1\n", b"normal 0 0\n"), "line 2: a facet has not one normal"),
         (TEXT.removesuffix(b"endsolid two\n"), "is truncated: its last solid does not end"),
         (b"solid a\n", "is truncated: its last solid does not end"),
-        (binary(np.eye(3)[None])[:-1], "is truncated: it announces 1 facets, for which 1 bytes are missing"),
+        (binary(np.eye(3)[None])[:-1], "is truncated: it announces 1 facet, for which 1 byte is missing"),
         (
             binary(np.eye(3)[None], b"solid")[:100],
-            "is truncated: it announces 1 facets, for which 34 bytes are missing",
+            "is truncated: it announces 1 facet, for which 34 bytes are missing",
         ),
         (binary(np.eye(3)[None]) + b"\0", "is not a readable stl file: it is neither text nor as long as"),
         (b"\0" * 80 + b"\xff" * 4, "is truncated: it announces 4,294,967,295 facets"),

@@ -309,7 +309,7 @@ def test_text_may_touch_the_tags_and_the_encoding_may_be_another(mark: bytes) ->
         (b'NumberOfPoints="4"', b'NumberOfPoints="-1"', "NumberOfPoints of a Piece is '-1'"),
         (b'NumberOfPoints="4"', b"", "NumberOfPoints of a Piece is ''"),
         (b'NumberOfCells="2"', b'NumberOfCells="3"', "' has less than 3 numbers"),
-        (b'NumberOfCells="2"', b'NumberOfCells="1"', "more than 1 numbers"),
+        (b'NumberOfCells="2"', b'NumberOfCells="1"', "more than 1 number"),
         (b">5 5<", b">5<", "'types' has less than 2 numbers"),
         (b">5 5<", b">5 10<", "a tetra with 3 vertices"),
         (b">3 6<", b">3 7<", "'connectivity' has less than 7 numbers"),

@@ -24,6 +24,14 @@ def test_pages_are_made_of_the_help(tmp_path: Path) -> None:
         assert page.read_text() == (tmp_path / page.name).read_text(), "make man makes them again"
 
 
+def test_no_summary_is_cut_short() -> None:
+    for page in PAGES:
+        text = page.read_text()
+        name, commands = text.partition(".SH NAME\n")[2], text.partition(".SH COMMANDS\n")[2]
+        assert name.partition("\n")[0].endswith(".")
+        assert "..." not in name.partition("\n")[0] + commands
+
+
 def test_pages_are_installed_where_man_looks() -> None:
     for page in PAGES:
         assert (Path(sys.prefix) / "share/man/man1" / page.name).read_text() == page.read_text(), (

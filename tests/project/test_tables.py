@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import re
+from dataclasses import fields
 
 import pytest
 from places import ROOT
@@ -13,7 +14,9 @@ from meshfix_cli.cli.untangle import untangle as command
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.formats import OWN
 from meshfix_cli.quality import formulas
-from meshfix_cli.quality.metrics import METRICS
+from meshfix_cli.quality.metrics import METRICS, NUMBERS
+from meshfix_cli.quality.requirement import Requirement
+from meshfix_cli.quality.summary import Summary
 from meshfix_cli.solve.strategies import STRATEGIES, Move
 
 DOCS, TESTS, PACKAGE = ROOT / "docs", ROOT / "tests", ROOT / "meshfix_cli"
@@ -55,6 +58,12 @@ def test_metrics() -> None:
     public = {name for name in functions if not name.startswith("_")} - {"evaluate", "worst_and_mean"}
     assert public == set(METRICS)
     assert 'parametrize("name", METRICS)' in (TESTS / "quality/test_metrics.py").read_text()
+
+
+def test_numbers_that_a_requirement_can_name() -> None:
+    assert list(NUMBERS) == [field.name for field in fields(Summary) if field.type in ("int", "float")]
+    for name in (*NUMBERS, *METRICS):
+        assert Requirement.parse(f"{name} >= 0").name == name
 
 
 def test_moves() -> None:

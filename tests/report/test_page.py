@@ -183,15 +183,17 @@ def test_elements_numbered_against_the_rest_are_inverted(tmp_path: Path) -> None
 
 
 def test_names_that_cannot_be_written_to(tmp_path: Path) -> None:
-    mesh = TANGLED[2]
-    assert b"is the name of a mesh" in run("quality", "--report", mesh, mesh, code=2).stderr
+    mesh, link = TANGLED[2], tmp_path / "mesh.html"
+    link.symlink_to(mesh)
+    assert b"is the name of a mesh" in run("quality", "--report", link, mesh, code=2).stderr
+    link.unlink()
     assert b"name a file" in run("quality", "--report", "-", mesh, code=2).stderr
     assert b"take one INPUT" in run("quality", "--report", tmp_path / "p.html", mesh, mesh, code=2).stderr
-    twice = ["--report", tmp_path / "p.svg", "--plot", tmp_path / "p.svg"]
+    twice = ["--report", tmp_path / "p", "--history", tmp_path / "p"]
     assert b"of another file to be written" in run("untangle", *twice, mesh, tmp_path / "o.vtk", code=2).stderr
     assert (
         b"may be the name of the backup"
-        in run("untangle", "--backup", "--report", tmp_path / "o.vtk.bak", mesh, tmp_path / "o.vtk", code=2).stderr
+        in run("untangle", "--backup", "--report", tmp_path / "o.bak.html", mesh, tmp_path / "o", code=2).stderr
     )
     missing = ["--report", tmp_path / "no" / "p.html"]
     assert b"does not exist" in run("untangle", *missing, mesh, tmp_path / "o.vtk", code=1).stderr
@@ -292,6 +294,26 @@ def test_axe_finds_nothing_and_a_phone_does_not_scroll_sideways(
             found = axe.Axe().run(tab)
             assert found.violations_count == 0, found.generate_report()
     assert pictures[0].mean() > 180 > 80 > pictures[1].mean()
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("width", [320, 360, 600])
+def test_the_worst_elements_are_not_cut_on_a_phone(
+    visit: Open, written: dict[int, Path], dimension: int, width: int
+) -> None:
+    """Nothing of the table is beyond the edge of the screen, the names of its columns stand before each value."""
+    with visit(written[dimension], viewport={"width": width, "height": 640}) as tab:
+        region = tab.get_by_role("region", name="worst element")
+        assert region.evaluate("one => one.scrollWidth <= one.clientWidth")
+        first = rows(written[dimension], "worst elements")[1]
+        box = region.get_by_text(first[5]).first.bounding_box()
+        assert box
+        assert box["x"] >= 0
+        assert box["x"] + box["width"] <= width
+        named = region.locator("td[data-column]").first.evaluate("one => getComputedStyle(one, '::before').content")
+        assert "smallest" in named
+        region.get_by_role("button", name="Show element").first.click()
+        assert f"in the middle element {first[0]}" in tab.locator("#drawn").inner_text()
 
 
 def test_what_users_write_is_shown_and_not_run(visit: Open, tmp_path: Path) -> None:

@@ -144,6 +144,11 @@ def test_arguments_out_of_range_are_refused(plate: Mesh, wrong: dict[str, Any]) 
         untangle(plate, **wrong)
 
 
+def test_a_strategy_that_there_is_not_is_refused_with_those_that_there_are(plate: Mesh) -> None:
+    with pytest.raises(ValueError, match=f"strategy is 'XX', and must be one of {', '.join(STRATEGIES)}"):
+        untangle(plate, strategy="XX")
+
+
 def test_what_cannot_be_mended_does_not_stop_the_best_smoothing(bracket: Mesh) -> None:
     stuck = with_an_inverted_fixed_simplex(tangle(bracket))
     free = bracket.movable[bracket.topology.simplices].any(axis=1)

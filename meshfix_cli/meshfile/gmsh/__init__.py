@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, naming
-from meshfix_cli.mesh.elements import solved_among
+from meshfix_cli.mesh.elements import counted, solved_among
 from meshfix_cli.meshfile.gmsh.cells import ORDER, TYPES
 from meshfix_cli.meshfile.gmsh.numbers import Int64
 from meshfix_cli.meshfile.gmsh.sections import Block, File, Numbers, UnknownError, read
@@ -55,7 +55,8 @@ def parse_parts(parts: Sequence[tuple[str, bytes]]) -> list[Source]:
         sources.append(replace(source, notes=(*source.notes, *lacking)))
     partitions = max(file.partitions for file in files)
     if partitions > len(files):
-        note = f"there are {len(files)} files, and {partitions} partitions of the mesh"
+        there = f"there {'is' if len(files) == 1 else 'are'} {counted(len(files), 'file', 'files')}"
+        note = f"{there}, and {partitions} partitions of the mesh"
         sources[0] = replace(sources[0], notes=(*sources[0].notes, note))
     return sources
 

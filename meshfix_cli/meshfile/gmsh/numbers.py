@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.splice import Places
 from meshfix_cli.meshfile.text import in_line, integers, integers_at, line_words, words
 
@@ -55,7 +56,8 @@ class Numbers:
         """Check that numbers of so many bytes can be there, before anything is made for them."""
         left = len(self.data) - self.at
         if not 0 <= count * size <= left:
-            raise ReadError(f"is truncated: {count:,} numbers are announced and {left:,} bytes are left")
+            announced = counted(count, "number is announced", "numbers are announced")
+            raise ReadError(f"is truncated: {announced} and {counted(left, 'byte is left', 'bytes are left')}")
 
 
 @dataclass

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.gmsh.cells import TYPES
 from meshfix_cli.meshfile.gmsh.numbers import Binary, Int64, Text
 from meshfix_cli.meshfile.splice import Places
@@ -225,7 +226,7 @@ def _elements_2(numbers: Numbers, file: File) -> None:
     if numbers.binary:
         numbers.at += 4 * used
     elif used < len(flat):
-        raise ReadError(f"is not a readable gmsh file: $Elements announces {count:,} elements and holds more")
+        raise ReadError(f"is not a readable gmsh file: $Elements announces {_elements(count)} and holds more")
     kinds = flat[heads + 1 - own]
     for kind in dict.fromkeys(kinds.tolist()):
         begin, size = heads[kinds == kind], _nodes_of(kind)
@@ -263,7 +264,11 @@ def _heads(flat: NDArray[Any], count: int, binary: bool) -> tuple[Int64, int]:
 
 
 def _too_few(count: int, left: int) -> ReadError:
-    return ReadError(f"is truncated: $Elements announces {count:,} elements and holds {count - left:,}")
+    return ReadError(f"is truncated: $Elements announces {_elements(count)} and holds {count - left:,}")
+
+
+def _elements(count: int) -> str:
+    return counted(count, "element", "elements")
 
 
 def _spread(begin: Int64, count: Int64, step: Int64) -> Int64:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.splice import Edits, Places, apply
 from meshfix_cli.meshfile.text import Spans, integers_at, numbers_at, words
 
@@ -114,12 +115,13 @@ class Text:
     def spans(self) -> Spans:
         """(size, 2) int64: the words."""
         text, (name, _, size) = self.body[self.begin : self.end], self.kind
+        numbers = counted(size, "number", "numbers")
         try:
             spans = words(text, 0, size)
         except ReadError as error:
-            raise ReadError(f"is truncated: its array {name!r} has less than {size:,} numbers") from error
+            raise ReadError(f"is truncated: its array {name!r} has less than {numbers}") from error
         if text[spans.max(initial=0) :].strip():
-            raise ReadError(f"is not a readable vtu file: its array {name!r} has more than {size:,} numbers")
+            raise ReadError(f"is not a readable vtu file: its array {name!r} has more than {numbers}")
         return spans + self.begin
 
     def read(self) -> NDArray[Any]:
@@ -321,7 +323,7 @@ def _decompress(stream: _Stream, number: int, size: int, coding: Coding, compres
 def _check(name: str, announced: int, size: int) -> None:
     if announced != size:
         problem = "is truncated" if announced < size else "is not a readable vtu file"
-        raise ReadError(f"{problem}: its array {name!r} has {announced:,} bytes, not {size:,}")
+        raise ReadError(f"{problem}: its array {name!r} has {counted(announced, 'byte', 'bytes')}, not {size:,}")
 
 
 def _opened(block: bytes, size: int, compressor: Compressor, name: str) -> bytes:

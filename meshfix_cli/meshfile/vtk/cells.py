@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, counted
 from meshfix_cli.meshfile.source import Cells, regions_among
 
 # The name and the number of vertices; 0: any.
@@ -81,7 +81,8 @@ def runs(
         if name == "polygon" and size == 3:
             name = "triangle"
         if expected not in (0, size):
-            raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {size} vertices")
+            corners = counted(size, "vertex", "vertices")
+            raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {corners}")
         if number not in _ORDER and rows[-1] - rows[0] == len(rows) - 1:  # they stand one behind the other
             vertices = connectivity[offsets[rows[0]] : offsets[rows[-1] + 1]].reshape(len(rows), size)
         else:

@@ -5,6 +5,7 @@ Source: VTK documentation, "VTK File Formats", section XML Formats, parallel fil
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +17,9 @@ from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.source import Source
 from meshfix_cli.meshfile.vtk import vtu
 from meshfix_cli.meshfile.vtk.xml import Element, XmlFile
+
+# XML holds no control characters, and of a name of a file only what is text.
+_NOT_XML = re.compile("[\x00-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +103,8 @@ class Index:
         there = Path(target)
         if there.exists() and there.samefile(self.path):
             return [str(path) for path in self.paths]
+        if _NOT_XML.search(there.stem):
+            raise WriteError(f"{target}: its name holds what XML cannot, in which a .pvtu names its pieces")
         targets = [there.parent / name for name in self._names_for(there)]
         mine = {path.resolve() for path in (*self.paths, self.path)}
         for piece in targets:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import REGIONS
 from meshfix_cli.meshfile.splice import Places
 from meshfix_cli.meshfile.text import behind_words, numbers_at, short_integers, words
@@ -247,7 +248,7 @@ class Sections:
         else:
             self.at = self._behind_words(begin, count)
         if self.at > len(self.data):
-            raise ReadError(f"is truncated: it ends within {count:,} numbers that it announces")
+            raise ReadError(f"is truncated: it ends within {counted(count, 'number', 'numbers')} that it announces")
         text = unquote_to_bytes(name).decode("utf-8", "replace")
         array = Array(self.data, self.binary, text, kind, tuples, components, begin, self.at)
         self._skip_metadata(components)
@@ -256,14 +257,14 @@ class Sections:
     def _behind_words(self, at: int, count: int) -> int:
         end = behind_words(self.data, at, count) if 2 * count <= len(self.data) - at + 1 else -1
         if end < 0:
-            raise ReadError(f"is truncated: it ends within {count:,} numbers that it announces")
+            raise ReadError(f"is truncated: it ends within {counted(count, 'number', 'numbers')} that it announces")
         return end
 
     def _behind_strings(self, at: int, count: int, prefixed: bool) -> int:
         """Strings stand in lines or behind their lengths; the first two bits of a length tell its size."""
         for _ in range(count):
             if at >= len(self.data):
-                raise ReadError(f"is truncated: it ends within {count:,} strings that it announces")
+                raise ReadError(f"is truncated: it ends within {counted(count, 'string', 'strings')} that it announces")
             if prefixed:
                 size = (8, 4, 2, 1)[self.data[at] >> 6]
                 length = int.from_bytes(self.data[at : at + size], "big")

@@ -17,12 +17,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import SIMPLICES
+from meshfix_cli.mesh.elements import SIMPLICES, counted
 from meshfix_cli.quality.summary import BIN_WIDTH
 from meshfix_cli.report.as_json import to_json
 from meshfix_cli.report.facts import Report, phases, processes, quality_rows, required, title, verdict
 from meshfix_cli.report.figures import Figures, Scene, Worst
 from meshfix_cli.report.page import charts
+from meshfix_cli.report.plain import plain
 
 FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
 PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")
@@ -51,13 +52,13 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
         script=script,
         style_hash=_hash(style),
         script_hash=_hash(script),
-        heading=escape(PurePath(report.name).name or report.name),
-        command=escape(report.command),
-        subject=escape(title(report)),
+        heading=_shown(PurePath(report.name).name or report.name),
+        command=_shown(report.command),
+        subject=_shown(title(report)),
         outcome="valid" if report.valid else "wrong",
         verdict=_verdict(report),
         lead=_lead(report),
-        picture=escape(_in_words(drawn.scene)),
+        picture=_shown(_in_words(drawn.scene)),
         stages=_stages(drawn.scene),
         legend=_legend(report, drawn.scene),
         keys=_keys(drawn.scene.dimension),
@@ -72,6 +73,11 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
     )
 
 
+def _shown(text: str) -> str:
+    """Return text for the page, which shows it and does nothing else with it."""
+    return escape(plain(text))
+
+
 def _hash(text: str) -> str:
     return f"sha256-{base64.b64encode(sha256(text.encode()).digest()).decode()}"
 
@@ -83,11 +89,11 @@ def _json(value: object) -> str:
 
 def _table(caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Sequence[str]]], style: str = "") -> str:
     """Return a table of text; it scrolls by itself where the page is narrower."""
-    first, *others = (escape(column) for column in columns)
+    first, *others = (_shown(column) for column in columns)
     corner = f'<th scope="col">{first}</th>' if first else "<td></td>"
     head = corner + "".join(f'<th scope="col">{column}</th>' for column in others)
     body = "".join(
-        f'<tr><th scope="row">{escape(name)}</th>{"".join(f"<td>{escape(cell)}</td>" for cell in cells)}</tr>'
+        f'<tr><th scope="row">{_shown(name)}</th>{"".join(f"<td>{_shown(cell)}</td>" for cell in cells)}</tr>'
         for name, cells in rows
     )
     return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", style)
@@ -95,8 +101,8 @@ def _table(caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Seque
 
 def _scrolled(caption: str, content: str, style: str = "") -> str:
     return (
-        f'<div class="wide" role="region" tabindex="0" aria-label="{escape(caption)}">'
-        f'<table class="{style}"><caption>{escape(caption)}</caption>{content}</table></div>'
+        f'<div class="wide" role="region" tabindex="0" aria-label="{_shown(caption)}">'
+        f'<table class="{style}"><caption>{_shown(caption)}</caption>{content}</table></div>'
     )
 
 
@@ -104,15 +110,15 @@ def _verdict(report: Report) -> str:
     word = "Valid" if report.valid else "Not valid"
     lines = [*verdict(replace(report, everything=False), listing=False), *(f"note: {note}" for note in report.notes)]
     lines = [line.removeprefix("valid: ").removeprefix("NOT VALID: ") for line in lines]
-    return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{escape(line)}</p>" for line in lines)
+    return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{_shown(line)}</p>" for line in lines)
 
 
 def _lead(report: Report) -> str:
     """Return the numbers that matter most, of the result and of the mesh as it came."""
     boxes = ""
     for name, values in quality_rows(report)[:4]:
-        was = f' <span class="was">from {escape(values[0])}</span>' if len(values) > 1 else ""
-        boxes += f"<div><dt>{escape(name)}</dt><dd>{escape(values[-1])}{was}</dd></div>"
+        was = f' <span class="was">from {_shown(values[0])}</span>' if len(values) > 1 else ""
+        boxes += f"<div><dt>{_shown(name)}</dt><dd>{_shown(values[-1])}{was}</dd></div>"
     return f'<dl class="lead">{boxes}</dl>'
 
 
@@ -125,13 +131,12 @@ def _in_words(scene: Scene) -> str:
 def _stages(scene: Scene) -> str:
     radios = ""
     for i, (name, state) in enumerate(scene.states.items()):
-        shown = len(state.inverted)
-        words = f"{name}: {state.count:,} inverted element{'s' * (state.count != 1)}"
+        words = f"{name}: {counted(state.count, 'inverted element', 'inverted elements')}"
         if state.left_out:
-            words += f", of which {shown:,} are drawn"
+            words += f", of which {counted(len(state.inverted), 'is', 'are')} drawn"
         radios += (
-            f'<label><input type="radio" name="stage" value="{i}" data-drawn="{escape(words)}"'
-            f"{' checked' * (i == 0)}>{escape(name)}</label>"
+            f'<label><input type="radio" name="stage" value="{i}" data-drawn="{_shown(words)}"'
+            f"{' checked' * (i == 0)}>{_shown(name)}</label>"
         )
     return radios
 
@@ -157,7 +162,7 @@ def _keys(dimension: int) -> str:
 
 def _requirements(report: Report) -> str:
     style = {True: "met", False: "unmet"}
-    items = "".join(f'<li class="{style[met]}">{escape(text)}</li>' for met, text in required(report))
+    items = "".join(f'<li class="{style[met]}">{_shown(text)}</li>' for met, text in required(report))
     return f'<ul class="plain">{items}</ul>' if items else ""
 
 
@@ -179,7 +184,7 @@ def _charts(report: Report, drawn: Figures) -> str:
 
 def _figure(caption: str, svg: str, numbers: str = "") -> str:
     details = f"<details><summary>The numbers</summary>{numbers}</details>" if numbers else ""
-    return f"<figure><figcaption>{escape(caption)}</figcaption>{svg}{details}</figure>\n"
+    return f"<figure><figcaption>{_shown(caption)}</figcaption>{svg}{details}</figure>\n"
 
 
 def _sweeps(report: Report, measure: str) -> str:
@@ -194,21 +199,26 @@ def _sweeps(report: Report, measure: str) -> str:
 def _worst(report: Report, drawn: Figures) -> str:
     shape = report.mesh.topology.element.shape
     angle, measure = shape.angle, shape.measure
-    columns = ["element", "picture", f"smallest {angle} [°]", measure, "inverted", "centroid"]
-    head = "".join(f'<th scope="col">{column}</th>' for column in columns)
-    body = "".join(_worst_row(one, drawn.scene) for one in drawn.worst)
+    columns = [f"smallest {angle} [°]", measure, "inverted", "centroid"]
+    head = "".join(f'<th scope="col">{column}</th>' for column in ("element", "picture", *columns))
+    body = "".join(_worst_row(one, columns, drawn.scene) for one in drawn.worst)
     count = f"{len(drawn.worst)} worst elements" if len(drawn.worst) > 1 else "worst element"
     caption = f"The {count} of the {_result(report)}, as the file numbers them"
-    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>")
+    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", "stacked")
 
 
-def _worst_row(one: Worst, scene: Scene) -> str:
+def _worst_row(one: Worst, columns: Sequence[str], scene: Scene) -> str:
+    """Return a row; each cell has the name of its column, which stands before it where the page is narrow."""
     corners = _placed(one.corners, scene).astype(float)
     reach = np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()
     place = [*corners.mean(axis=0), *[0.0] * (3 - scene.dimension), max(float(reach), 1e-6)]
-    cells = f"<td>{one.angle:.3f}</td><td>{one.measure:.3g}</td>"
-    cells += '<td class="inverted">yes</td>' if one.inverted else "<td>no</td>"
-    cells += f"<td>({', '.join(f'{x:.6g}' for x in one.centroid)})</td>"
+    centroid = f"({', '.join(f'{x:.6g}' for x in one.centroid)})"
+    values = f"{one.angle:.3f}", f"{one.measure:.3g}", "yes" if one.inverted else "no", centroid
+    styles = "", "", "inverted" * one.inverted, ""
+    cells = "".join(
+        f'<td data-column="{column}" class="{style}">{value}</td>'
+        for column, style, value in zip(columns, styles, values, strict=True)
+    )
     data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
     button = f'<button type="button" hidden {data} aria-label="Show element {one.id}">Show</button>'
     return f'<tr><th scope="row">{one.id}</th><td>{button}</td>{cells}</tr>'

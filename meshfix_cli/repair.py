@@ -97,13 +97,12 @@ class Files:
 
         if self.dry_run:
             return document.as_stored(mesh), ()
+        notes: tuple[str, ...] = ()
         unknown = unknown_extension(document, self.target) if self.form is None else None
-        as_input = f"{self.target}: the extension {unknown} is not known, so it is written as {output.reader}"
-        notes = (as_input,) if unknown else ()
+        if unknown is not None:
+            notes = (f"{self.target}: the extension {unknown} is not known, so it is written as {output.reader}",)
         stored, dropped = write(document, mesh, self.target, output, self.backup, put)
-        if document.is_kept_by(output):
-            return stored, notes
-        if document.is_as_read(stored, output):
+        if document.is_kept_by(output) or document.is_as_read(stored, output):
             return stored, notes
         lost = f"; dropped: {_listed(dropped)}" if dropped else ""
         if output.reader != document.format.reader:

@@ -303,7 +303,8 @@ def test_the_worst_elements_are_not_cut_on_a_phone(
 ) -> None:
     """Nothing of the table is beyond the edge of the screen, the names of its columns stand before each value."""
     with visit(written[dimension], viewport={"width": width, "height": 640}) as tab:
-        region = tab.get_by_role("region", name="worst element")
+        settled(tab)
+        region = tab.get_by_role("region", name="The 10 worst elements")
         assert region.evaluate("one => one.scrollWidth <= one.clientWidth")
         first = rows(written[dimension], "worst elements")[1]
         box = region.get_by_text(first[5]).first.bounding_box()

@@ -59,8 +59,8 @@ sanitize: ## run the kernel tests with address and undefined-behaviour sanitiser
 	  tests/kernels tests/mesh tests/quality/test_obstacles.py tests/solve
 
 EXAMPLES ?= 5000
-fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format
-	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/meshfile/test_fuzz.py
+fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format, and judge as many meshes with a fault
+	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/meshfile/test_fuzz.py tests/meshfile/test_verdicts.py
 
 stress: $(VENV)/installed ## untangle 259 hard cases; which are solved, how fast and how well
 	$(BIN)/python benchmarks/stress.py

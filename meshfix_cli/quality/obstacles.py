@@ -89,7 +89,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         np.sort(rows[inverted[free == 0]]),
         np.unique(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
         np.unique(np.sort(rows[pairs[within]], axis=1), axis=0),
-        np.sort(rows[_overlapping(mesh, points, pairs[~within], inverted, threads)]),
+        np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
     )
 
 
@@ -105,22 +105,14 @@ def _exclusive(
 
 
 def _overlapping(
-    mesh: Mesh,
-    points: Array,
-    crossing: NDArray[np.int32],
-    inverted: NDArray[np.int32],
-    threads: int,
+    mesh: Mesh, points: Array, movable: NDArray[np.bool_], inverted: NDArray[np.int32], threads: int
 ) -> NDArray[np.int32]:
     """Return rows of the connectivity: simplices at places of their part that lie in another part as well.
 
-    Parameters
-    ----------
-    crossing : (c, 2) int32
-        Pairs of simplices of different parts with facets that cross. Below all facets of these parts is looked, as
-        deep as flat facets of that size may interpenetrate where curved parts are in contact, and at the centroids of
-        simplices that are as large. One facet speaks for a part that crosses no other.
-    inverted : (i,) int32
-        Simplices whose centroids say nothing, as those of simplices with a free vertex, which may be anywhere.
+    Below every facet of the boundary is looked and, in parts that cross others, at the centroids of simplices that are
+    as large as what crosses; there as deep as flat facets of that size may interpenetrate where curved parts are in
+    contact. The centroids of these inverted simplices (i,) say nothing, as those of simplices with a free vertex, which
+    may be anywhere.
     """
     connectivity = mesh.topology.connectivity
     component = connectivity.component
@@ -130,19 +122,34 @@ def _overlapping(
     facets = connectivity.simplices[rows[:, None], np.array(SIMPLICES[points.shape[1]].shape.facets)[positions]]
     corners, parts = points[facets], component[rows]
     size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    largest = np.zeros(len(component))  # facet at the boundary, of each simplex
-    np.maximum.at(largest, rows, size)
-    length = np.zeros(component.max() + 1)  # of what crosses each part
-    np.maximum.at(length, component[crossing].ravel(), np.repeat(largest[crossing].max(axis=1, initial=0.0), 2))
+    length = _crossing_lengths(points, facets, parts, size, movable, threads)
     below = np.where(length[parts] > 0, CONTACT * np.maximum(size, length[parts]), TOUCHING * size)
     places = corners.mean(axis=1) - below[:, None] * _outward(corners)
-    asked = np.union1d(np.unique(parts, return_index=True)[1], np.flatnonzero(length[parts] > 0))
+    largest = np.zeros(len(component))  # facet at the boundary, of each simplex
+    np.maximum.at(largest, rows, size)
     rigid = np.setdiff1d(mesh.stuck(threads), inverted)
     inner = rigid[(length[component[rigid]] > 0) & (largest[rigid] > AS_LARGE * length[component[rigid]])]
-    owners = np.concatenate([rows[asked], inner]).astype(np.int32)
-    places = np.concatenate([places[asked], points[connectivity.simplices[inner]].mean(axis=1)])
+    owners = np.concatenate([rows, inner]).astype(np.int32)
+    places = np.concatenate([places, points[connectivity.simplices[inner]].mean(axis=1)])
     found = kernels.enclosing(points, facets, parts, places, component[owners], threads)
     return np.unique(owners[found >= 0])
+
+
+def _crossing_lengths(
+    points: Array,
+    facets: NDArray[np.int32],
+    parts: NDArray[np.int32],
+    size: Array,
+    movable: NDArray[np.bool_],
+    threads: int,
+) -> Array:
+    """Return the size of the largest of the fixed facets (f, d) with which each part (p,) crosses another, or 0."""
+    fixed = np.flatnonzero(~movable[facets].any(axis=1))
+    pairs = fixed[kernels.crossings(points, np.ascontiguousarray(facets[fixed]), threads)]
+    pairs = pairs[parts[pairs[:, 0]] != parts[pairs[:, 1]]]
+    length = np.zeros(parts.max() + 1)
+    np.maximum.at(length, parts[pairs].ravel(), np.repeat(size[pairs].max(axis=1), 2))
+    return length
 
 
 def _outward(corners: Array) -> Array:

@@ -13,8 +13,11 @@ from meshfix_cli.mesh.mesh import Mesh
 # Before they are imported: their assertions say what they compared.
 pytest.register_assert_rewrite("commands", "meshes", "programs", "splicing")
 
-# A shell starts what runs in the background with SIGINT ignored, which the programs that the tests start would inherit.
+# A shell starts what runs in the background with SIGINT ignored, and nohup with SIGHUP, which the programs that the
+# tests start would inherit.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+if hasattr(signal, "SIGHUP"):
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 @pytest.fixture(scope="session")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import io
+import os
 import re
 import tempfile
 from collections.abc import Iterator
@@ -27,6 +28,7 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
 BLOCK = "exodus:block"
+_OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _WITH_SETS = ("abaqus", "exodus")
@@ -206,6 +208,8 @@ def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None
     except OSError as error:
         if error.filename is not None:  # of ours; those of HDF5 are about what a file names, or about its content
             raise
+        if error.errno in _OF_THE_DEVICE:
+            raise OSError(error.errno, os.strerror(error.errno)) from error
         missing = error.errno == errno.ENOENT
         cause, reason = error, "a file that it names is missing" if missing else "meshio cannot make sense of it"
     except SystemExit as error:

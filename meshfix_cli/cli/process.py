@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -10,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import IO, TYPE_CHECKING, Any, NoReturn, TextIO, cast
 
 import click
 
@@ -63,17 +64,23 @@ class Group(click.Group):
             if getattr(sys, name) is None:  # closed by the shell: >&-
                 closed.add(name)
                 setattr(sys, name, Path(os.devnull).open(mode))  # noqa: SIM115 (for the whole run)
+        for name in ("stdout", "stderr"):
+            stream = getattr(sys, name)
+            if isinstance(getattr(stream, "buffer", None), io.RawIOBase):
+                setattr(sys, name, _buffered(stream))
+                setattr(sys, f"__{name}__", getattr(sys, name))
         try:
             try:
                 return super().main(*args, **kwargs)
             finally:
                 sys.stdout.flush()
-        except BrokenPipeError:  # whoever read our output has gone
-            _print_no_more()
-            sys.exit(128 + getattr(signal, "SIGPIPE", 13))
+        except BrokenPipeError:
+            _end_without_a_reader()
         except OSError as error:
-            _print_no_more()
+            _print_no_more(sys.stdout)
             fail(_in_words(error))
+        finally:
+            _flush(sys.stderr)
 
     def make_context(self, *arguments: Any, **more: Any) -> click.Context:
         """Read the command line."""
@@ -100,16 +107,37 @@ class Group(click.Group):
             fail(f"{str(error).rpartition(' from ')[2].strip(chr(39))}: too many levels of symbolic links")
 
 
+def _buffered(stream: io.TextIOWrapper) -> io.TextIOWrapper:
+    """Put a buffer below a stream that has none, as with PYTHONUNBUFFERED: there what a full device leaves is lost."""
+    words, errors = stream.encoding, stream.errors
+    below = cast("io.RawIOBase", stream.detach())
+    return io.TextIOWrapper(io.BufferedWriter(below), words, errors, line_buffering=True)
+
+
 def _in_words(error: OSError) -> str:
     """Say what the system says, of the file it is about or of stdout."""
     name = error.filename if error.filename is not None else "<stdout>"
     return f"{os.fsdecode(name) if isinstance(name, (str, bytes)) else name}: {error.strerror or error}"
 
 
-def _print_no_more() -> None:
+def _end_without_a_reader() -> NoReturn:
+    """End as the system ends a program whose output nobody reads any more."""
+    _print_no_more(sys.stdout)
+    sys.exit(128 + getattr(signal, "SIGPIPE", 13))
+
+
+def _flush(stream: TextIO) -> None:
+    """Print what is still to be printed, if it can be."""
+    try:
+        stream.flush()
+    except OSError:
+        _print_no_more(stream)
+
+
+def _print_no_more(stream: TextIO) -> None:
     """Let what is still to be printed go nowhere: Python would try once more at the end."""
     with suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 @contextmanager
@@ -117,10 +145,20 @@ def _in_plain_words() -> Iterator[None]:
     """Let what click says of wrong usage be one line that does not act on a terminal, whatever the user wrote."""
     try:
         yield
+    except BrokenPipeError:  # click would end with 1
+        _end_without_a_reader()
     except click.UsageError as error:
         if isinstance(error, getattr(click.exceptions, "NoArgsIsHelpError", ())):  # it is the help that it shows
             raise
-        raise click.UsageError(plain(error.format_message()), error.ctx) from error
+        raise _WrongUsage(plain(error.format_message()), error.ctx) from error
+
+
+class _WrongUsage(click.UsageError):
+    """Has its exit code where nobody can be told, too."""
+
+    def show(self, file: IO[Any] | None = None) -> None:
+        with suppress(OSError):
+            super().show(file)
 
 
 def _stop(number: int, frame: object) -> NoReturn:
@@ -141,13 +179,15 @@ def _stop(number: int, frame: object) -> NoReturn:
 
 
 def complain(message: str) -> None:
-    """Print an error, on one line of stderr."""
-    click.echo(f"meshfix: error: {plain(message)}", err=True)
+    """Print an error, on one line of stderr, if that takes it."""
+    with suppress(OSError):
+        click.echo(f"meshfix: error: {plain(message)}", err=True)
 
 
 def fail(message: str) -> NoReturn:
     """Print an error and end."""
     complain(message)
+    _flush(sys.stdout)
     sys.exit(ERROR)
 
 

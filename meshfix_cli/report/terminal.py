@@ -40,7 +40,13 @@ def console(stream: Any) -> Console:
     """Return a console for a stream; plain text of 100 columns where that is not a terminal."""
     if hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="replace")  # a terminal that lacks a character shows another
-    return Console(file=stream, width=None if stream.isatty() else 100, highlight=False)
+    return _Console(file=stream, width=None if stream.isatty() else 100, highlight=False)
+
+
+class _Console(Console):
+    def on_broken_pipe(self) -> None:
+        """Let the command line end as it does for whatever else it prints; rich would end with 1."""
+        raise BrokenPipeError
 
 
 def print_report(report: Report, out: Console) -> None:

@@ -94,9 +94,14 @@ def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> l
     """
     targets = [os.path.join(folder, os.path.basename(source)) for source in sources]  # noqa: PTH118, PTH119
     pieces = [(source, *pieces_of(source, target)) for source, target in zip(sources, targets, strict=True)]
-    inputs = {os.path.realpath(path): source for source, paths, _ in pieces for path in (source, *paths)}
-    if len(inputs) < len(sources) + sum(len(paths) for _, paths, _ in pieces):
-        raise ValueError(f"{_shared(pieces)} is an input, and a piece of another as well")
+    inputs = {os.path.realpath(source): source for source in sources}  # links to one file are repaired each
+    for source, paths, _ in pieces:
+        for path in paths:
+            other = inputs.setdefault(os.path.realpath(path), source)
+            if other != source:
+                is_input = os.path.realpath(path) == os.path.realpath(other)
+                shared = "an input" if is_input else f"a piece of {other}"
+                raise ValueError(f"{path} is a piece of {source}, and {shared} as well")
     pairs = [*zip(sources, targets, strict=True), *([(beside, beside)] if beside else [])]
     pairs += [(source, target) for source, _, made in pieces for target in made]
     written: dict[str, str] = {}
@@ -109,18 +114,6 @@ def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> l
             raise ValueError(f"{written[place]} and {source} would both be written to {target}")
         written[place] = source
     return targets
-
-
-def _shared(pieces: Sequence[tuple[str, list[str], list[str]]]) -> str:
-    """Return the first file that stands twice."""
-    seen: set[str] = set()
-    for source, paths, _ in pieces:
-        for path in (source, *paths):
-            place = os.path.realpath(path)
-            if place in seen:
-                return path
-            seen.add(place)
-    raise AssertionError
 
 
 @dataclass(frozen=True)

@@ -116,6 +116,53 @@ def test_a_full_device_is_one_line(arguments: str) -> None:
     assert (done.returncode, done.stderr) == (1, b"meshfix: error: <stdout>: No space left on device\n")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_where_nobody_can_be_told_the_exit_code_tells(unbuffered: str) -> None:
+    for arguments, code in (("--bogus", 2), ("quality", 2), ("quality no.vtk", 1), (f"quality --json {VALID}", 0)):
+        command = ["sh", "-c", f"'{MESHFIX}' {arguments} 2>/dev/full"]
+        done = subprocess.run(
+            command, stdout=subprocess.DEVNULL, check=False, env={**os.environ, "PYTHONUNBUFFERED": unbuffered}
+        )
+        assert done.returncode == code
+
+
+@POSIX
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", [("quality", "--json", VALID), ("quality", VALID), ("untangle", "-q", TANGLED)])
+def test_a_device_that_is_full_in_the_middle(arguments: tuple[str, ...], unbuffered: str, tmp_path: Path) -> None:
+    whole = run(*arguments).stdout
+    room, begun = max(len(whole), 4096), tmp_path / "begun"
+    begun.write_bytes(bytes(room - len(whole) // 2))
+
+    def limit() -> None:
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, room))
+
+    with begun.open("ab") as stdout:
+        done = subprocess.run(
+            [MESHFIX, *arguments], stdout=stdout, stderr=subprocess.PIPE, preexec_fn=limit, check=False,
+            env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+        )  # fmt: skip
+    assert (done.returncode, done.stderr) == (1, b"meshfix: error: <stdout>: File too large\n")
+    assert begun.stat().st_size == room
+
+
+@POSIX
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+@pytest.mark.parametrize("arguments", ["--help", f"quality {VALID}", f"quality --json {VALID}", f"untangle {TANGLED}"])
+def test_a_reader_that_goes_away_ends_the_command_as_it_does_any_other(arguments: str, unbuffered: str) -> None:
+    read_end, write_end = os.pipe()
+    os.close(read_end)
+    done = subprocess.run(
+        [MESHFIX, *arguments.split()], stdout=write_end, stderr=subprocess.PIPE, check=False,
+        env={**os.environ, "PYTHONUNBUFFERED": unbuffered},
+    )  # fmt: skip
+    os.close(write_end)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGPIPE, b"")
+
+
 @POSIX
 def test_links_that_lead_in_a_circle(tmp_path: Path) -> None:
     loop, history, out = tmp_path / "loop.vtk", tmp_path / "loop.csv", tmp_path / "out.vtk"

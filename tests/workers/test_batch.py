@@ -212,6 +212,20 @@ def test_wrong_usage_is_told_before_any_work(
     assert sorted(p.name for p in tmp_path.iterdir()) == ["in", "link"]
 
 
+@POSIX
+def test_links_to_one_file_are_repaired_each_and_none_is_written_through(inputs: Path, tmp_path: Path) -> None:
+    fill(inputs, "a.vtk")
+    (inputs / "link.vtk").symlink_to("a.vtk")
+    out = tmp_path / "out"
+    run("batch", "-q", "--jobs", 1, inputs / "*.vtk", "--output-dir", out)
+    assert (out / "a.vtk").read_bytes() == (out / "link.vtk").read_bytes() != (inputs / "a.vtk").read_bytes()
+    assert not (out / "link.vtk").is_symlink()
+    (out / "a.vtk").unlink()
+    (out / "a.vtk").symlink_to(inputs / "link.vtk")
+    said = error_line("batch", inputs / "a.vtk", "--output-dir", out, code=2)
+    assert f"{out / 'a.vtk'} would replace the input" in said
+
+
 def test_nothing_is_done_where_nothing_can_be_written(inputs: Path, tmp_path: Path) -> None:
     fill(inputs, "a.vtk")
     (tmp_path / "file").touch()

@@ -46,13 +46,24 @@ def misread(data: bytes, form: Format) -> str | None:
         return "is truncated: it does not end with $FIN"
     if form.name == "mdpa" and len(re.findall(rb"(?m)^\s*Begin ", data)) != len(re.findall(rb"(?m)^\s*End ", data)):
         return "is truncated: a block does not end"
-    if form.name == "su2":
-        zones = re.search(rb"(?m)^\s*NZONE\s*=\s*(\d+)", data)
-        if zones and int(zones[1]) > 1:
-            return f"holds {int(zones[1])} zones, and one mesh is read: give each zone a file of its own"
-    if form.name == "xdmf" and len(re.findall(rb"<Grid\b[^>]*?/?>", data)) > 1:
-        return "holds several grids, and one mesh is read: write the mesh alone"
+    for what, pattern in _ONCE.get(form.name, ()):
+        if len(re.findall(pattern, data)) > 1:
+            return f"holds several {what}, and one mesh is read: give each a file of its own"
     return None
+
+
+# What stands once in a file of one mesh: of several, meshio reads one, or lays them over one another.
+_ONCE = {
+    "avsucd": [("meshes", rb"(?m)^\s*(?:\d+[ \t]+){4}\d+\s*\n\s*\d+(?:[ \t]+[-+.\d]\S*){3}\s*\n")],
+    "dolfin-xml": [("meshes", rb"<mesh\b")],
+    "mdpa": [("blocks of nodes", rb"(?m)^\s*Begin\s+Nodes\b")],
+    "nastran": [("bulk data sections", rb"(?mi)^\s*BEGIN\s+(?:BULK|SUPER)\b")],
+    "netgen": [("meshes", rb"(?m)^\s*points\s*$")],
+    "off": [("meshes", rb"(?m)^\s*(?:ST)?C?N?4?n?OFF\b")],
+    "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],
+    "su2": [("zones", rb"(?m)^\s*(?:NZONE\s*=\s*(?:[2-9]|1\d)|IZONE\s*=)"), ("zones", rb"(?m)^\s*NPOIN\s*=")],
+    "xdmf": [("grids", rb"<Grid\b"), ("domains", rb"<Domain\b")],
+}
 
 
 def missing_cells(data: bytes, form: Format, cells: int) -> str | None:

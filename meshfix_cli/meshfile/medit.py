@@ -98,6 +98,8 @@ def _sections(text: bytes, at: int) -> Iterator[_Section]:
         _check_blank(text[at : match.start()] if known else b"", name)
         name, at = match[0].decode(), match.end()
         if name == "End":
+            if b"MeshVersionFormatted" in text[at:]:
+                raise ReadError("holds several meshes, and one mesh is read: give each a file of its own")
             return
         if name == "Dimension":
             (dimension, at), known = _integer(text, at), True

@@ -23,6 +23,7 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply, pairs
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 
+_SECOND = re.compile(rb"ply[\r\n]+format ")  # one more header behind the rows of the first
 _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r|\Z)")
 _LINE = re.compile(rb"[^\r\n]+")
 _ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
@@ -342,6 +343,8 @@ def _text(word: bytes) -> str:
 
 
 def _tables(data: bytes, header: _Header) -> dict[str, _Table]:
+    if _SECOND.search(data, header.end):
+        raise ReadError("holds several meshes, and one mesh is read: give each a file of its own")
     body = _Binary(data, header.end, header.order) if header.order else _Text(data, header.end)
     filled = [one for one in header.elements.values() if one.properties]
     return {one.name: _Table(one, body, body.anchors(one)) for one in filled}

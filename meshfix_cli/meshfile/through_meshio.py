@@ -86,9 +86,9 @@ def _several_zones(path: Path) -> str | None:
     import h5py
 
     with h5py.File(path) as file:
-        bases = [base for base in file.values() if base.attrs.get("label") == b"CGNSBase_t"]
-        zones = sum(zone.attrs.get("label") == b"Zone_t" for base in bases for zone in base.values())
-    return f"holds {zones} zones, and one mesh is read: give each zone a file of its own" if zones > 1 else None
+        groups = [group for base in file.values() if isinstance(base, h5py.Group) for group in base.values()]
+        zones = sum(isinstance(group, h5py.Group) and "GridCoordinates" in group for group in groups)
+    return "holds several zones, and one mesh is read: give each a file of its own" if zones > 1 else None
 
 
 def _refuse(why: str | None) -> None:

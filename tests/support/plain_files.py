@@ -1,8 +1,11 @@
-"""A mesh as a plain file of each format that meshfix reads by itself, with all digits that the format can hold."""
+"""A mesh as a plain file of each format that meshfix reads, with all digits that the format can hold."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Mapping
+from contextlib import redirect_stderr, redirect_stdout
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +24,8 @@ def by_meshio(form: str, points: NDArray[np.floating], cells: Cells, path: Path,
     blocks = [(name, rows.astype(np.int32)) for name, rows in cells.items()]
     # Given, they are not computed, which would divide by the area of a facet.
     data = {"facet_normals": [np.zeros((len(rows), 3)) for _, rows in blocks]} if form == "stl" else {}
-    meshio.Mesh(points, blocks, cell_data=data).write(path, form, **options)
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):  # it warns of formats that may change
+        meshio.Mesh(points, blocks, cell_data=data).write(path, form, **options)
 
 
 def abaqus(points: NDArray[np.floating], cells: Cells, path: Path) -> None:
@@ -33,6 +37,29 @@ def abaqus(points: NDArray[np.floating], cells: Cells, path: Path) -> None:
             number += 1
             lines.append(", ".join(map(str, [number, *(i + 1 for i in row)])))
     path.write_text("\n".join(lines) + "\n")
+
+
+NASTRAN = {"triangle": "CTRIA3", "quad": "CQUAD4", "tetra": "CTETRA", "wedge": "CPENTA", "pyramid": "CPYRAM"}
+
+
+def nastran(points: NDArray[np.floating], cells: Cells, path: Path) -> None:
+    """Write the free format: what has more corners than six takes a second line, which none here does."""
+    lines = ["BEGIN BULK", *[f"GRID,{i},,{','.join(map(repr, row))}" for i, row in enumerate(points.tolist(), 1)]]
+    rows = [(name, row) for name, some in cells.items() for row in some.tolist()]
+    lines += [
+        f"{NASTRAN[name]},{number},1,{','.join(str(i + 1) for i in row)}" for number, (name, row) in enumerate(rows, 1)
+    ]
+    path.write_text("\n".join([*lines, "ENDDATA", ""]))
+
+
+def plane(form: str, **options: Any) -> Callable[[NDArray[np.floating], Cells, Path], None]:
+    """Write plane meshes with two coordinates: there is no other way to say that they are plane."""
+
+    def write(points: NDArray[np.floating], cells: Cells, path: Path) -> None:
+        flat = set(cells) <= {"triangle", "quad"}
+        by_meshio(form, points[:, :2] if flat else points, cells, path, **options)
+
+    return write
 
 
 def of_meshio(form: str, **options: Any) -> Callable[[NDArray[np.floating], Cells, Path], None]:
@@ -60,6 +87,32 @@ WRITERS: dict[str, Callable[[NDArray[np.floating], Cells, Path], None]] = {
     "binary.ply": of_meshio("ply", binary=True),
     "text.stl": of_meshio("stl", binary=False),
     "binary.stl": of_meshio("stl", binary=True),
+    # Those that meshio reads for meshfix.
+    "through.avs": of_meshio("avsucd"),
+    "through.bdf": nastran,
+    "through.f3grid": of_meshio("flac3d"),
+    "through.lb8.ugrid": of_meshio("ugrid"),
+    "through.mdpa": of_meshio("mdpa"),
+    "through.node": of_meshio("tetgen"),
+    "through.off": of_meshio("off"),
+    "through.post": of_meshio("permas"),
+    "through.su2": plane("su2"),
+    "through.vol": of_meshio("netgen"),
+    "through.xdmf": of_meshio("xdmf", data_format="XML"),
+    "through.xml": plane("dolfin-xml"),
 }
+if find_spec("h5py"):
+    WRITERS |= {f"through.{form}": of_meshio(form) for form in ("cgns", "h5m", "hmf", "med")}
+if find_spec("netCDF4"):
+    WRITERS["through.e"] = of_meshio("exodus")
 SINGLE = ("single.vtk", "single.vtu", "binary.stl")  # the coordinates are rounded
-SURFACES = ("surface.obj", "text.ply", "binary.ply", "text.stl", "binary.stl")
+SURFACES = (".obj", ".ply", ".stl", ".off")  # what holds no tetrahedra
+SOLIDS = (".cgns", ".f3grid", ".node")  # what holds no plane mesh
+# What holds no other cells, or is written so by meshio.
+SIMPLICES = (".stl", ".ply", ".cgns", ".h5m", ".mdpa", ".node", ".off", ".xml", "gmsh41.msh", "gmsh41_binary.msh")
+
+
+def writers(dimension: int, mixed: bool) -> list[str]:
+    """Return the names of files that can hold a mesh exactly, with cells of other types beside simplices if `mixed`."""
+    out = (*SINGLE, *(SURFACES if dimension == 3 else SOLIDS), *(SIMPLICES if mixed else ()))
+    return [name for name in WRITERS if not name.endswith(out)]

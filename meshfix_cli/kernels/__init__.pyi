@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
+Uint8 = NDArray[np.uint8]
 
 BUILD: str  # what processors these are for
 DUE: int
@@ -40,8 +41,11 @@ class Connectivity:
     def boundary(self) -> NDArray[np.uint8]:
         """1 for the vertices (k,) of facets that belong to one simplex."""
 
-    def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32]:
-        """Facets (f, d) without a movable vertex, each once, and a simplex of each."""
+    def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32, Uint8]:
+        """Facets (f, d) without a movable vertex, each once, a simplex of each, and 1 where two share it.
+
+        They are oriented: the simplices are all on the same side of them.
+        """
 
     @property
     def crowded(self) -> int:
@@ -143,6 +147,12 @@ def linear_program(
 
 def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
     """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
+
+def folds(points: Float64, facets: Int32, shared: Uint8, threads: int) -> Int32:
+    """Pairs (k, 2) of oriented facets (f, d) that lie upon each other, their insides on the same side.
+
+    Those that are `shared` (f,) have their insides on both sides.
+    """
 
 def enclosing(points: Float64, facets: Int32, parts: Int32, places: Float64, own: Int32, threads: int) -> Int32:
     """For each place (q, d) that is inside its own part (q,) another that it is inside of; -1: there is none.

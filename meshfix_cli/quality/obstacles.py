@@ -33,6 +33,9 @@ class Obstacles:
     crossing : (c, 2) int32
         Pairs of simplices of one part that have fixed facets which cross each other: the part overlaps itself, even
         where all of its simplices are positive. Each facet's first 16 crossings are looked for.
+    folding : (b, 2) int32
+        Pairs of simplices of one part that have fixed facets in one line or plane, which lie upon each other with their
+        insides on the same side: the boundary folds back upon itself there. Of each facet the first 16.
     overlapping : (o,) int32
         Simplices at the boundary of a part, below which another part is as well.
     """
@@ -40,22 +43,24 @@ class Obstacles:
     inverted: NDArray[np.int32]
     exclusive: NDArray[np.int32]
     crossing: NDArray[np.int32]
+    folding: NDArray[np.int32]
     overlapping: NDArray[np.int32]
 
     def __bool__(self) -> bool:
-        return any(map(len, (self.inverted, self.exclusive, self.crossing, self.overlapping)))
+        return any(map(len, (self.inverted, self.exclusive, self.crossing, self.folding, self.overlapping)))
 
     def hopeless(self, mesh: Mesh) -> NDArray[np.bool_] | None:
         """Mark simplices (m,), in the order of the connectivity, that may stay inverted whatever is done.
 
-        Those that are named here and, where facets cross, the neighbours of these. None: there are none.
+        Those that are named here and, where facets cross or fold, the neighbours of these. None: there are none.
         """
         if not self:
             return None
         named = np.zeros(mesh.topology.m, dtype=bool)
         named[self.inverted] = named[self.exclusive] = True
         around = np.zeros(mesh.topology.n, dtype=bool)
-        around[mesh.topology.simplices[self.crossing]] = True
+        for pairs in (self.crossing, self.folding):
+            around[mesh.topology.simplices[pairs]] = True
         named |= around[mesh.topology.simplices].any(axis=1)
         return named[mesh.topology.connectivity.rows]
 
@@ -80,15 +85,21 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     movable = mesh.along_curve(mesh.movable)
     inverted = kernels.check(points, connectivity.simplices, threads)[0]
     free = movable[connectivity.simplices[inverted]].sum(axis=1)
-    facets, owners = connectivity.fixed_facets(movable, threads)
-    pairs = owners[kernels.crossings(points, facets, threads)]
-    parts = connectivity.component[pairs]
-    within = parts[:, 0] == parts[:, 1]
+    facets, owners, shared = connectivity.fixed_facets(movable, threads)
     rows = connectivity.rows
+
+    def in_one_part(pairs: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return which simplices have these facets, of pairs of one part."""
+        simplices = owners[pairs]
+        parts = connectivity.component[simplices]
+        within = (parts[:, 0] == parts[:, 1]) & (simplices[:, 0] != simplices[:, 1])
+        return np.unique(np.sort(rows[simplices[within]], axis=1), axis=0)
+
     return Obstacles(
         np.sort(rows[inverted[free == 0]]),
         np.unique(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
-        np.unique(np.sort(rows[pairs[within]], axis=1), axis=0),
+        in_one_part(kernels.crossings(points, facets, threads)),
+        in_one_part(kernels.folds(points, facets, shared, threads)),
         np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
     )
 

@@ -254,11 +254,11 @@ def _impossible(report: Report) -> Iterator[str]:
             f"IMPOSSIBLE: {count:,} elements exclude each other: wherever the free vertex that they share goes, one of "
             f"them is inverted ({_some(report, found.exclusive)})"
         )
-    if count := len(found.crossing):
-        pairs = report.ids[found.crossing[: report.listed]].tolist()
-        which = ", ".join(f"{a} and {b}" for a, b in pairs) + ", ..." * (len(pairs) < count)
-        places = counted(count, "place", "places")
-        yield f"IMPOSSIBLE: the fixed boundary crosses itself in {places} (elements {which})"
+    for pairs, what in ((found.crossing, "crosses itself"), (found.folding, "folds back upon itself")):
+        if count := len(pairs):
+            first = report.ids[pairs[: report.listed]].tolist()
+            which = ", ".join(f"{a} and {b}" for a, b in first) + ", ..." * (len(first) < count)
+            yield f"IMPOSSIBLE: the fixed boundary {what} in {counted(count, 'place', 'places')} (elements {which})"
     if len(found.overlapping):
         yield f"IMPOSSIBLE: separate parts of the mesh overlap ({_some(report, found.overlapping)})"
 

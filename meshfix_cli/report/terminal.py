@@ -153,6 +153,8 @@ def _result_line(result: Mapping[str, Any]) -> str:
         parts.append(f"{result['misnumbered']:,} numbered against the rest of the mesh")
     if result["obstacles"]["crossing"]:
         parts.append("the fixed boundary crosses itself")
+    if result["obstacles"]["folding"]:
+        parts.append("the fixed boundary folds back upon itself")
     if result["obstacles"]["overlapping"]:
         parts.append("separate parts overlap")
     parts += [f"{counted(count, *words(key))} not judged" for key, count in result["not_judged"].items()]

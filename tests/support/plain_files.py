@@ -39,16 +39,19 @@ def abaqus(points: NDArray[np.floating], cells: Cells, path: Path) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-NASTRAN = {"triangle": "CTRIA3", "quad": "CQUAD4", "tetra": "CTETRA", "wedge": "CPENTA", "pyramid": "CPYRAM"}
+NASTRAN = {
+    "triangle": "CTRIA3", "quad": "CQUAD4", "tetra": "CTETRA", "pyramid": "CPYRAM", "wedge": "CPENTA",
+    "hexahedron": "CHEXA",
+}  # fmt: skip
 
 
 def nastran(points: NDArray[np.floating], cells: Cells, path: Path) -> None:
-    """Write the free format: what has more corners than six takes a second line, which none here does."""
+    """Write the free format, in which the seventh corner begins a second line."""
     lines = ["BEGIN BULK", *[f"GRID,{i},,{','.join(map(repr, row))}" for i, row in enumerate(points.tolist(), 1)]]
-    rows = [(name, row) for name, some in cells.items() for row in some.tolist()]
-    lines += [
-        f"{NASTRAN[name]},{number},1,{','.join(str(i + 1) for i in row)}" for number, (name, row) in enumerate(rows, 1)
-    ]
+    rows = [(name, row) for name, some in cells.items() for row in (some + 1).tolist()]
+    for number, (name, row) in enumerate(rows, 1):
+        corners = ",".join(map(str, row[:6])) + "".join([",+\n+,", ",".join(map(str, row[6:]))] if row[6:] else "")
+        lines.append(f"{NASTRAN[name]},{number},1,{corners}")
     path.write_text("\n".join([*lines, "ENDDATA", ""]))
 
 

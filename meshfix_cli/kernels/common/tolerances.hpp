@@ -44,6 +44,7 @@ constexpr double LEAST_SHARE = 0.01;
 // Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:
 // files of six digits, or in single precision, make facets that only touch interpenetrate by less.
 constexpr double CROSSING = 1e-5;
+constexpr double IN_LINE = 1e-12;  // of the largest coordinate: what facets of one line or plane may be apart
 constexpr std::size_t CROSSINGS_PER_FACET = 16;  // that are looked for; a tangled boundary has no end of them
 
 // Minimum-norm point: relative optimality gap.

@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "mesh/crossings.hpp"
+#include "mesh/folds.hpp"
 #include "mesh/python.hpp"
 
 namespace meshfix {
@@ -117,8 +118,8 @@ auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movab
     FixedFacets found = with_dimension(self.dimension, [&](auto d) {
         return fixed_facets<d>(self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), mask, threads);
     });
-    return std::make_pair(to_numpy(std::move(found.vertices), static_cast<std::size_t>(self.dimension)),
-                          to_numpy(std::move(found.owners)));
+    return std::make_tuple(to_numpy(std::move(found.vertices), static_cast<std::size_t>(self.dimension)),
+                           to_numpy(std::move(found.owners)), to_numpy(std::move(found.shared)));
 }
 
 auto used_vertices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
@@ -157,6 +158,15 @@ auto crossings_py(const Matrix<const double>& points, const Matrix<const std::in
     return to_numpy(std::move(pairs), 2);
 }
 
+auto folds_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
+              const Vector<const std::uint8_t>& shared, int threads) {
+    const auto count = static_cast<std::int64_t>(facets.shape(0));
+    std::vector<std::int32_t> pairs = with_dimension(points.shape(1), [&](auto d) {
+        return find_folds<d>(points.data(), facets.data(), shared.data(), count, threads);
+    });
+    return to_numpy(std::move(pairs), 2);
+}
+
 auto enclosing_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
                   const Vector<const std::int32_t>& parts, const Matrix<const double>& places,
                   const Vector<const std::int32_t>& own, int threads) {
@@ -192,6 +202,7 @@ void bind_mesh(nb::module_& m) {
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert(), "threads"_a);
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
+    m.def("folds", &folds_py, "points"_a.noconvert(), "facets"_a.noconvert(), "shared"_a.noconvert(), "threads"_a);
     m.def("enclosing", &enclosing_py, "points"_a.noconvert(), "facets"_a.noconvert(), "parts"_a.noconvert(),
           "places"_a.noconvert(), "own"_a.noconvert(), "threads"_a);
     m.attr("BLOCK_SIZE") = BLOCK_SIZE;

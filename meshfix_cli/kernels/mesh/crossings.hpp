@@ -61,16 +61,26 @@ class Crossings {
     }
 
     std::vector<std::int32_t> find(int threads) const {
+        return find(threads, [&](std::int32_t a, std::int32_t b) { return cross(a, b); });
+    }
+
+    // Pairs of facets (a, b) whose boxes meet and for which `holds(a, b)`.
+    template <class Holds>
+    std::vector<std::int32_t> find(int threads, const Holds& holds) const {
         std::vector<std::vector<std::int32_t>> found(order_.size() / FACETS_PER_ITEM + 1);
         for_each_item(static_cast<std::int64_t>(found.size()), threads, [&](std::int64_t item) {
             const auto count = static_cast<std::int64_t>(order_.size());
             for (std::int64_t i = item * FACETS_PER_ITEM; i < std::min(count, (item + 1) * FACETS_PER_ITEM); ++i)
                 search(0, 0, count, static_cast<std::int32_t>(i), box_of(static_cast<std::int32_t>(i)),
-                       found[item].size() + 2 * CROSSINGS_PER_FACET, found[item]);
+                       found[item].size() + 2 * CROSSINGS_PER_FACET, holds, found[item]);
         });
         std::vector<std::int32_t> pairs;
         for (const auto& part : found) pairs.insert(pairs.end(), part.begin(), part.end());
         return pairs;
+    }
+
+    Vec<D> vertex(std::int32_t facet, int k) const {
+        return load<D>(points_ + static_cast<std::int64_t>(facets_[static_cast<std::int64_t>(facet) * D + k]) * D);
     }
 
     // In which part besides its own a place lies: one whose oriented facets close around it. -1: in none, or not in its own.
@@ -169,10 +179,6 @@ class Crossings {
     static constexpr std::int64_t LEAF = 8, FACETS_PER_ITEM = 1024;
     static constexpr int PARTS_AT = 5;  // depth in the tree
 
-    Vec<D> vertex(std::int32_t facet, int k) const {
-        return load<D>(points_ + static_cast<std::int64_t>(facets_[static_cast<std::int64_t>(facet) * D + k]) * D);
-    }
-
     Box box_of(std::int32_t facet) const {
         Box box{vertex(facet, 0), vertex(facet, 0)};
         for (int k = 1; k < D; ++k) box.add(vertex(facet, k));
@@ -226,17 +232,18 @@ class Crossings {
     }
 
     // Appends pairs until there are `full` numbers.
+    template <class Holds>
     void search(std::size_t node, std::int64_t begin, std::int64_t end, std::int32_t facet, const Box& box,
-                std::size_t full, std::vector<std::int32_t>& found) const {
+                std::size_t full, const Holds& holds, std::vector<std::int32_t>& found) const {
         if (found.size() >= full || !boxes_[node].meets(box)) return;
         if (end - begin > LEAF) {
             const std::int64_t middle = (begin + end) / 2;
-            search(2 * node + 1, begin, middle, facet, box, full, found);
-            search(2 * node + 2, middle, end, facet, box, full, found);
+            search(2 * node + 1, begin, middle, facet, box, full, holds, found);
+            search(2 * node + 2, middle, end, facet, box, full, holds, found);
             return;
         }
         for (std::int64_t i = begin; i < end; ++i)
-            if (order_[i] > facet && leaves_[i].meets(box) && cross(facet, order_[i]))
+            if (order_[i] > facet && leaves_[i].meets(box) && holds(facet, order_[i]))
                 found.insert(found.end(), {facet, order_[i]});
     }
 

@@ -158,6 +158,7 @@ std::vector<std::int32_t> stuck_simplices(const std::int32_t* simplices, std::in
 // Facets all of whose vertices are fixed, each once, with the simplex that has it, or the first of two.
 struct FixedFacets {
     std::vector<std::int32_t> vertices, owners;  // (f, D), (f,)
+    std::vector<std::uint8_t> shared;            // (f,) 1: by two
 };
 
 template <int D>
@@ -175,6 +176,7 @@ FixedFacets fixed_facets(const std::int32_t* simplices, const std::int32_t* mate
                 if (free != (movable[simplex[k]] != 0) || (mates[corner] >= 0 && mates[corner] < corner)) continue;
                 for (int position : opposite_face<D>(k)) part.vertices.push_back(simplex[position]);
                 part.owners.push_back(s);
+                part.shared.push_back(mates[corner] >= 0);
             }
         }
         parts[item] = std::move(part);
@@ -183,6 +185,7 @@ FixedFacets fixed_facets(const std::int32_t* simplices, const std::int32_t* mate
     for (const auto& part : parts) {
         found.vertices.insert(found.vertices.end(), part.vertices.begin(), part.vertices.end());
         found.owners.insert(found.owners.end(), part.owners.begin(), part.owners.end());
+        found.shared.insert(found.shared.end(), part.shared.begin(), part.shared.end());
     }
     return found;
 }

@@ -42,10 +42,40 @@ def misread(data: bytes, form: Format) -> str | None:
 
     Several meshes in one file are laid over one another.
     """
+    if form.name == "off":
+        return without_counts(data.partition(b"\n")[2]) or _several(data, form)
+    if form.name == "nastran" and re.search(rb"BEGIN BULK", data) and not _BULK.search(data):
+        return "is truncated: it ends with BEGIN BULK"
+    if form.name == "dolfin-xml" and (why := _fewer(data)):
+        return why
     if form.name == "permas" and b"$FIN" not in data:
         return "is truncated: it does not end with $FIN"
     if form.name == "mdpa" and len(re.findall(rb"(?m)^\s*Begin ", data)) != len(re.findall(rb"(?m)^\s*End ", data)):
         return "is truncated: a block does not end"
+    return _several(data, form)
+
+
+# A line behind BEGIN BULK that is no comment; meshio looks for one for ever.
+_BULK = re.compile(rb"(?s)BEGIN BULK.*?\n(?![$#]|//)[^\n]{3,}\n")
+
+
+def _fewer(data: bytes) -> str | None:
+    """Say that a file of dolfin announces more than it holds: meshio leaves the rest to what was in the memory."""
+    for what, one in ((b"vertices", rb"<vertex\b"), (b"cells", rb"<(?:triangle|tetrahedron)\b")):
+        size = re.search(rb"<%s\s[^>]*\bsize\s*=\s*[\"'](\d+)" % what, data)
+        held = len(re.findall(one, data))
+        if size and held < int(size[1]):
+            return f"is truncated: it announces {int(size[1]):,} {what.decode()} and holds {held:,}"
+    return None
+
+
+def without_counts(text: bytes) -> str | None:
+    """Say that a text has no line but comments where its counts should be: meshio looks for one for ever."""
+    return None if re.search(rb"(?m)^[ \t\r]*[^#\s]", text) else "is truncated: it ends before its counts"
+
+
+def _several(data: bytes, form: Format) -> str | None:
+    """Say that there are several meshes."""
     for what, pattern in _ONCE.get(form.name, ()):
         if len(re.findall(pattern, data)) > 1:
             return f"holds several {what}, and one mesh is read: give each a file of its own"

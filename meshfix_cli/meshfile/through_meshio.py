@@ -22,6 +22,7 @@ from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, solved_among
 from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
@@ -46,6 +47,8 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
         _refuse(foreign.misread(data, form))
         _refuse(_unknown_elements(data) if form.name == "mdpa" else None)
         _refuse(_several_zones(path) if form.name == "cgns" else None)
+        for one in (".node", ".ele") if form.name == "tetgen" else ():
+            _refuse(foreign.without_counts(path.with_suffix(one).read_bytes()))
         mesh = meshio.read(path, file_format=form.reader)
         _refuse(foreign.missing_cells(data, form, sum(len(block.data) for block in mesh.cells)))
         return _source(mesh, data, form)
@@ -198,7 +201,6 @@ def _arbitrary(form: Format, cells: list[Cells]) -> bool:
 def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None]:
     """Turn whatever meshio raises into one sentence; also its sys.exit, for which it prints the reason."""
     printed = io.StringIO()
-    cause: BaseException
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             yield
@@ -206,24 +208,21 @@ def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None
     except MeshfixError:
         raise
     except OSError as error:
-        if error.filename is not None:  # of ours; those of HDF5 are about what a file names, or about its content
+        # Of ours; those of HDF5 are about what a file names, or its content, and netCDF has numbers below 0 for that.
+        if error.filename is not None and (error.errno or 0) > 0:
             raise
         if error.errno in _OF_THE_DEVICE:
             raise OSError(error.errno, os.strerror(error.errno)) from error
-        missing = error.errno == errno.ENOENT
-        cause, reason = error, "a file that it names is missing" if missing else "meshio cannot make sense of it"
+        cause: BaseException = error
     except SystemExit as error:
         if error.code not in (None, 1):  # that of a signal: meshio's is 1
             raise
-        cause, reason = error, printed.getvalue()
-    except ImportError as error:
-        cause, reason = error, f"that needs the package {error.name}"
+        cause = error
     except Exception as error:
-        # What meshio says is for people; what the libraries below it say is not.
-        said = str(error) if isinstance(error, (meshio.ReadError, meshio.WriteError)) else ""
-        cause, reason = error, said or "meshio cannot make sense of it"
-    reason = " ".join(reason.replace(str(path), "it").split())[:200]
-    raise kind(f"{what} ({reason})") from cause
+        cause = error
+    words = {} if kind is ReadError else {"otherwise": "it does not take all that is in the mesh"}
+    reason = plainly(cause, printed.getvalue() if isinstance(cause, SystemExit) else "", **words)
+    raise kind(f"{what} ({reason.replace(str(path), 'it')})") from cause
 
 
 def _native(array: Any) -> Any:

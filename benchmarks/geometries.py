@@ -173,6 +173,99 @@ def block() -> tuple[Points, Cells]:
     return generate.extruded(*polygon(0.17, corners), np.linspace(0.0, 3.0, 19))
 
 
+def o_grid() -> tuple[Points, Cells]:
+    """Return the rings of triangles between a circle and another of four times its size, as around a body in a flow."""
+    return rings(1.0, 4.0, 120, 40)
+
+
+def graded_rings() -> tuple[Points, Cells]:
+    """Return rings whose triangles grow with the radius, to a thousand times in length."""
+    return rings(0.5, 500.0, 60)
+
+
+def rings(inner: float, outer: float, count: int, layers: int | None = None) -> tuple[Points, Cells]:
+    """Return triangles between two circles; without a number of layers they are nearly equilateral."""
+    if layers is None:
+        layers = round(math.log(outer / inner) / math.log(1 + 2 * math.pi / count * math.sqrt(3) / 2))
+    radii, corner = np.geomspace(inner, outer, layers + 1), np.arange(count)
+    turn = 2 * np.pi * (corner + 0.5 * (np.arange(layers + 1)[:, None] % 2)) / count
+    points = np.stack([radii[:, None] * np.cos(turn), radii[:, None] * np.sin(turn)], axis=-1).reshape(-1, 2)
+    following = (corner + 1) % count
+    cells = []
+    for i in range(layers):
+        a, b, c, d = i * count + corner, i * count + following, (i + 1) * count + corner, (i + 1) * count + following
+        both = [(a, c, b), (b, c, d)] if i % 2 else [(a, c, d), (a, d, b)]
+        cells += [np.column_stack(three) for three in both]
+    return points, positive(points, np.concatenate(cells))
+
+
+def koch() -> tuple[Points, Cells]:
+    """Return the equilateral triangles inside a Koch curve."""
+    outline, step = circle(0, 0, 1.0, 3), np.exp(-1j * np.pi / 3)
+    curve = outline[:, 0] + 1j * outline[:, 1]
+    for _ in range(3):
+        third = (np.roll(curve, -1) - curve) / 3
+        curve = np.column_stack([curve, curve + third, curve + third * (1 + step), curve + 2 * third]).ravel()
+    h = math.sqrt(3) / 27
+    rows, columns = np.mgrid[-45:46, -45:46]
+    # Turned, since one of the curve's sides stands upright.
+    lattice = 1.0 + h * (math.sqrt(3) / 2 * rows + 1j * (columns + rows / 2))
+    points = np.column_stack([lattice.real.ravel(), lattice.imag.ravel()])
+    number = np.arange(points.shape[0]).reshape(rows.shape)
+    a, b, c, d = number[:-1, :-1].ravel(), number[:-1, 1:].ravel(), number[1:, :-1].ravel(), number[1:, 1:].ravel()
+    cells = np.concatenate([np.column_stack([a, b, c]), np.column_stack([b, d, c])])
+    cells = cells[_inside(points[cells].mean(axis=1), [np.column_stack([curve.real, curve.imag])])]
+    used, cells = np.unique(cells, return_inverse=True)
+    return points[used], positive(points[used], cells.reshape(-1, 3))
+
+
+def airfoil() -> tuple[Points, Cells]:
+    """Return an O-grid around a slender body, whose first layers are a thousandth as high as they are wide."""
+    count, turn = 120, 2 * np.pi * np.arange(120) / 120
+    heights = np.concatenate([[0.0], np.cumsum(5e-5 * 1.35 ** np.arange(34))])
+    body = np.column_stack([np.cos(turn), 0.12 * np.sin(turn)])
+    outward = _unit(np.column_stack([0.12 * np.cos(turn), np.sin(turn)]))
+    far = 4 * np.column_stack([np.cos(turn), np.sin(turn)]) - body
+    share = (heights / heights[-1])[:, None, None]
+    points = (body + heights[:, None, None] * outward * (1 - share) + share * far).reshape(-1, 2)
+    corner = np.arange(count)
+    a = (np.arange(len(heights) - 1)[:, None] * count + corner).ravel()
+    b = (np.arange(len(heights) - 1)[:, None] * count + (corner + 1) % count).ravel()
+    cells = np.concatenate([np.column_stack([a, b, b + count]), np.column_stack([a, b + count, a + count])])
+    return points, positive(points, cells)
+
+
+def kuhn() -> tuple[Points, Cells]:
+    """Return a cube of Kuhn's tetrahedra."""
+    axis = np.linspace(0, 1, 9)
+    return grid(axis, axis, axis)
+
+
+def corner() -> tuple[Points, Cells]:
+    """Return a square whose triangles grow away from a corner, a million times in length."""
+    axis = graded_axis(36, 1e6)
+    return grid(axis, axis)
+
+
+def cylinder() -> tuple[Points, Cells]:
+    """Return a round cylinder of irregular tetrahedra."""
+    return generate.extruded(*polygon(0.2, circle(0, 0, 0.5, 16)), np.linspace(0.0, 2.0, 13))
+
+
+def chamber() -> tuple[Points, Cells]:
+    """Return a rectangle of irregular triangles."""
+    return polygon(0.08, np.array([(0, 0), (1, 0), (1, 2), (0, 2)], dtype=float))
+
+
+def graded_box() -> tuple[Points, Cells]:
+    """Return a box whose tetrahedra grow along it, a thousand times in length."""
+    steps = 1e3 ** (np.arange(60) / 59)
+    points, cells = grid(np.linspace(0, 1, 4), np.linspace(0, 1, 4), np.arange(61.0))
+    size = np.concatenate([steps, steps[-1:]])[points[:, 2].astype(int)]
+    along = np.concatenate([[0.0], np.cumsum(steps / 3)])[points[:, 2].astype(int)]
+    return np.column_stack([points[:, 0] * size, points[:, 1] * size, along]), cells
+
+
 GEOMETRIES: dict[str, Callable[[], tuple[Points, Cells]]] = {
     "plate with holes": lambda: generate.plate(0.13),
     "L-shaped plate": l_shape,
@@ -187,4 +280,11 @@ GEOMETRIES: dict[str, Callable[[], tuple[Points, Cells]]] = {
     "graded cube": graded_cube,
     "layers 1:100": layers,
     "block": block,
+    "O-grid": o_grid,
+    "rings 1:1000": graded_rings,
+    "Koch": koch,
+    "airfoil 1:1000": airfoil,
+    "corner 1:1e6": corner,
+    "Kuhn cube": kuhn,
+    "box 1:1000": graded_box,
 }

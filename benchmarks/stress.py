@@ -2,7 +2,8 @@
 
 Every case starts from a mesh that is valid by construction, so it has a solution, but for those of the family
 "impossible". A case is solved where no element is inverted and no facet folded, and the fixed vertices have not
-moved; the exit code is 1 where one fails, or where success is reported wrongly.
+moved; the exit code is 1 where one fails, or where success is reported wrongly. A result is poor where its smallest
+angle is below half of that of the mesh before it was tangled.
 """
 
 from __future__ import annotations
@@ -15,13 +16,26 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from geometries import GEOMETRIES, Points, block, gear, pipes, shell, thin_plate
+from geometries import (
+    GEOMETRIES,
+    Points,
+    airfoil,
+    block,
+    chamber,
+    cylinder,
+    gear,
+    o_grid,
+    pipes,
+    rings,
+    shell,
+    thin_plate,
+)
 from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli import Mesh, perturb, summarise, untangle
-from meshfix_cli.solve.strategies import STRATEGIES
+from meshfix_cli.solve.strategies import SMOOTH, STRATEGIES, Smooth
 
 PERTURBATIONS = ((5, 1), (10, 1), (25, 1), (50, 2), (100, 1), (25, 8), (100, 8), (100, 32), (100, 100))
 SOLVED, IMPOSSIBLE, FAILED, WRONG = "solved", "impossible", "failed", "wrong"
@@ -31,11 +45,12 @@ Map = Callable[[Points], Points]
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A tangled mesh; `possible`: it has a valid solution."""
+    """A tangled mesh, and the smallest angle in degrees that it had before; `possible`: it has a valid solution."""
 
     family: str
     name: str
     mesh: Mesh
+    angle: float
     possible: bool = True
 
 
@@ -49,6 +64,11 @@ class Result:
     min_angle: float
     mean_angle: float
 
+    @property
+    def poor(self) -> bool:
+        """Whether the smallest angle is below half of what it was."""
+        return self.case.possible and self.min_angle < 0.5 * self.case.angle
+
 
 def cases(seed: int = 0) -> Iterator[Case]:
     """Yield every case, in a fixed order."""
@@ -56,26 +76,29 @@ def cases(seed: int = 0) -> Iterator[Case]:
         mesh = Mesh.build(*make())
         yield from _tangled(family, mesh, seed)
     yield from _two_materials(seed)
+    yield from _curves(seed)
     yield from _morphed()
     yield from _impossible()
 
 
 def _tangled(family: str, mesh: Mesh, seed: int) -> Iterator[Case]:
     h, free, random = mesh.mean_edge_length(), mesh.movable, np.random.default_rng(seed)
+    angle = summarise(mesh).min_angle
     for percent, distance in PERTURBATIONS:
-        yield Case(family, f"P={percent} D={distance}h", perturb(mesh, percent, distance * h, seed)[0])
+        yield Case(family, f"P={percent} D={distance}h", perturb(mesh, percent, distance * h, seed)[0], angle)
     low, high, inner = mesh.points.min(axis=0), mesh.points.max(axis=0), mesh.points[free]
     starts = {
         "random": random.uniform(low, high, inner.shape),
         "permuted": random.permutation(inner),
         "collapsed": np.broadcast_to(inner.mean(axis=0), inner.shape),
+        "flattened": np.column_stack([inner[:, :-1], np.full(len(inner), low[-1])]),
     }
     for k in range(4):
         starts[f"inverted patch {k}"] = _turned_over(inner, inner[random.integers(len(inner))], (k + 1) * 2 * h)
     for name, positions in starts.items():
         points = mesh.points.copy()
         points[free] = positions
-        yield Case(family, name, mesh.with_points(points))
+        yield Case(family, name, mesh.with_points(points), angle)
 
 
 def _turned_over(points: Points, centre: NDArray[np.float64], radius: float) -> Points:
@@ -93,6 +116,14 @@ def _two_materials(seed: int) -> Iterator[Case]:
     yield from _tangled("two materials", Mesh.build(points, cells, fixed=points[:, 2] == middle), seed)
 
 
+def _curves(seed: int) -> Iterator[Case]:
+    """Yield cases of rings around a hole, in which the vertices of a circle and those of a ray are held."""
+    points, cells = rings(1.0, 3.0, 60, 22)
+    radius, turn = np.linalg.norm(points, axis=1), np.arctan2(points[:, 1], points[:, 0])
+    circle, ray = np.isclose(radius, radius[10 * 60]), (np.abs(turn) < 0.06) & (radius > radius[10 * 60])
+    yield from _tangled("embedded curves", Mesh.build(points, cells, fixed=circle | ray), seed)
+
+
 def _morphed() -> Iterator[Case]:
     """Yield meshes whose boundary was moved and whose interior was left behind."""
     for family, make, name, maps in (
@@ -105,14 +136,21 @@ def _morphed() -> Iterator[Case]:
         ("box with pipes", pipes, "sheared by", {f"{s:g}": _sheared(s) for s in (0.5, 1, 2, 4)}),
         ("gear", gear, "sheared by", {f"{s:g}": _sheared(s) for s in (0.5, 1, 2)}),
         ("block", block, "squeezed to", {f"{s:g}": _squeezed(s) for s in (0.3, 0.1, 0.03)}),
+        ("piston, 2-D", chamber, "pressed to", {f"{s:g}": _squeezed(s) for s in (0.5, 0.2, 0.1, 0.05)}),
+        ("piston, 3-D", cylinder, "pressed to", {f"{s:g}": _squeezed(s) for s in (0.5, 0.2, 0.1, 0.05)}),
+        ("O-grid", o_grid, "hole turned by", {f"{a}°": _turning(a, 4.0, 1.0) for a in (10, 30, 60)}),
+        ("airfoil 1:1000", airfoil, "turned by", {f"{a}°": _turning(a, 4.0, 1.0) for a in (1, 3, 10)}),
     ):
         mesh = Mesh.build(*make())
         for how, moved in maps.items():
             target = moved(mesh.points)
             if mesh.with_points(target.copy()).check()[0]:
                 raise ValueError(f"{family}, {name} {how}: the map itself tangles the mesh")
-            points = np.where(mesh.movable[:, None], mesh.points, target)
-            yield Case(family, f"{name} {how}", Mesh.build(points, mesh.topology.simplices))
+            points, angle = (
+                np.where(mesh.movable[:, None], mesh.points, target),
+                summarise(mesh.with_points(target)).min_angle,
+            )
+            yield Case(family, f"{name} {how}", Mesh.build(points, mesh.topology.simplices), angle)
 
 
 def _turned(points: Points, angle: NDArray[np.float64], centre: float = 0.0) -> Points:
@@ -126,7 +164,7 @@ def _turned(points: Points, angle: NDArray[np.float64], centre: float = 0.0) -> 
 def _turning(degrees: float, outer: float, inner: float) -> Map:
     """Turn the inner boundary; the outer one stays."""
     angle = np.radians(degrees)
-    return lambda p: _turned(p, angle * (outer - np.linalg.norm(p, axis=1)) / (outer - inner))
+    return lambda p: _turned(p, angle * (outer - np.maximum(np.linalg.norm(p, axis=1), inner)) / (outer - inner))
 
 
 def _twisted(degrees: float) -> Map:
@@ -150,7 +188,7 @@ def _sheared(slope: float) -> Map:
 
 
 def _squeezed(factor: float) -> Map:
-    return lambda p: p * np.array([1.0, 1.0, factor])
+    return lambda p: p * np.array([1.0] * (p.shape[1] - 1) + [factor])
 
 
 def _impossible() -> Iterator[Case]:
@@ -161,17 +199,17 @@ def _impossible() -> Iterator[Case]:
         first, *others = simplices[~mesh.movable[simplices].any(axis=1)][0]
         points = mesh.points.copy()
         points[first] = 2 * points[others].mean(axis=0) - points[first]
-        yield Case("impossible", f"{name}: an inverted fixed simplex", mesh.with_points(points), possible=False)
+        yield Case("impossible", f"{name}: an inverted fixed simplex", mesh.with_points(points), 0.0, possible=False)
         points = mesh.points.copy()
         hole = np.linalg.norm(points[:, :2] - np.array([0.8, 1.25]), axis=1) < 0.36
         points[hole & ~mesh.movable, 1] += 0.5
-        yield Case("impossible", f"{name}: a hole across the rim", mesh.with_points(points), possible=False)
+        yield Case("impossible", f"{name}: a hole across the rim", mesh.with_points(points), 0.0, possible=False)
 
 
-def run(case: Case, strategy: str, threads: int = 1) -> Result:
+def run(case: Case, strategy: str, smooth: Smooth = SMOOTH, threads: int = 1) -> Result:
     """Untangle, and judge the result by its own measures."""
     start = time.perf_counter()
-    outcome = untangle(case.mesh, strategy, threads=threads)
+    outcome = untangle(case.mesh, strategy, smooth=smooth, threads=threads)
     seconds = time.perf_counter() - start
     summary = summarise(outcome.after)
     held = ~case.mesh.movable
@@ -189,7 +227,7 @@ def run(case: Case, strategy: str, threads: int = 1) -> Result:
 def print_results(results: list[Result], console: Console) -> None:
     """Print a line for each family, then whatever failed."""
     verdicts = (SOLVED, IMPOSSIBLE, FAILED, WRONG)
-    columns = ("family", "cases", *verdicts, "seconds", "longest", "smallest angle", "mean angle")
+    columns = ("family", "cases", *verdicts, "poor", "seconds", "longest", "smallest angle", "mean angle")
     table = Table(
         *columns, title="angles: the worst case's smallest, the mean over the cases of the elements' smallest"
     )
@@ -197,34 +235,38 @@ def print_results(results: list[Result], console: Console) -> None:
     for family in [*families, ""]:
         rows = [result for result in results if family in ("", result.case.family)]
         solved = [result for result in rows if result.verdict == SOLVED] or rows
-        counts = [str(sum(result.verdict == verdict for result in rows)) for verdict in verdicts]
+        counts = [sum(result.verdict == verdict for result in rows) for verdict in verdicts]
+        counts.append(sum(result.poor for result in rows))
         times = [result.seconds for result in rows]
         table.add_row(
-            family or "all", str(len(rows)), *counts, f"{sum(times):.2f}", f"{max(times):.2f}",
+            family or "all", str(len(rows)), *map(str, counts), f"{sum(times):.2f}", f"{max(times):.2f}",
             f"{min(result.min_angle for result in solved):.3f}",
             f"{sum(result.mean_angle for result in solved) / len(solved):.2f}", end_section=family == families[-1],
         )  # fmt: skip
     console.print(table)
     for result in results:
-        if result.verdict in (FAILED, WRONG):
-            console.print(f"{result.verdict}: {result.case.family}, {result.case.name}")
+        if result.verdict in (FAILED, WRONG) or result.poor:
+            angles = f"{result.min_angle:.4g}° of {result.case.angle:.4g}°"
+            verdict = "poor" if result.verdict == SOLVED else result.verdict
+            console.print(f"{verdict}: {result.case.family}, {result.case.name}: {angles}")
 
 
 def main() -> None:
     """Run all cases."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--strategy", choices=tuple(STRATEGIES), default="auto")
+    parser.add_argument("--smooth", type=lambda word: word if word in ("auto", "best") else int(word), default=SMOOTH)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--output", type=Path, help="a CSV file with a line for each case")
     options = parser.parse_args()
-    results = [run(case, options.strategy) for case in cases(options.seed)]
+    results = [run(case, options.strategy, options.smooth) for case in cases(options.seed)]
     print_results(results, Console(width=120))
     if options.output is not None:
         lines = [
-            f"{r.case.family},{r.case.name},{r.verdict},{r.seconds:.4f},{r.min_angle:.4f},{r.mean_angle:.3f}"
+            f"{r.case.family},{r.case.name},{r.verdict},{r.seconds:.4f},{r.min_angle:.4f},{r.mean_angle:.3f},{r.case.angle:.4f}"
             for r in results
         ]
-        options.output.write_text("\n".join(["family,case,verdict,seconds,smallest,mean", *lines]) + "\n")
+        options.output.write_text("\n".join(["family,case,verdict,seconds,smallest,mean,before", *lines]) + "\n")
     sys.exit(any(result.verdict in (FAILED, WRONG) for result in results))
 
 

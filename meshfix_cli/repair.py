@@ -9,12 +9,12 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from meshfix_cli.errors import WriteError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.strategies import SMOOTH, plan
+from meshfix_cli.solve.strategies import SMOOTH, Smooth, plan
 
 if TYPE_CHECKING:
     import numpy as np
@@ -124,7 +124,7 @@ class Method:
 
     strategy: str = "auto"
     sweeps: int | None = None
-    smooth: int | Literal["best"] = SMOOTH
+    smooth: Smooth = SMOOTH
     threshold: float | None = None
     max_move: Distance | None = None
     only_invalid: bool = False

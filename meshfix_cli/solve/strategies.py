@@ -8,15 +8,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from typing import Literal
+from typing import Final, Literal
 
 SWEEPS = 40  # section 4: the untangling stops after 40 sweeps
-SMOOTH = 3  # section 4: three passes of smoothing
+SMOOTH: Final = "auto"  # the smoothing where none is asked for
+PASSES = 3  # section 4: three passes of smoothing
 MOST_PASSES = 1_000_000
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
 RATIO_SWEEPS = 2  # of "best": later ones gain little
+MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold
 ANGLE_SWEEPS = 3
+RINGS = (4,)  # around inverted elements in which the work begins
 REGIONS = (0, 2, 4, 8, None)  # rings around inverted elements that sweeps take in, where only those may move
 
 
@@ -35,6 +38,9 @@ class Move(IntEnum):
     COME_BACK = 9
 
 
+Smooth = int | Literal["auto", "best"]
+
+
 @dataclass(frozen=True)
 class Phase:
     """Sweeps of vertex moves, or minimisations of the foldover-free energy.
@@ -47,44 +53,62 @@ class Phase:
         Those of the sweeps, in turn. None: the phase minimises the energy of `foldover.py`.
     max_sweeps : int or None
         None: the limit of all untangling sweeps, `SWEEPS` where there is none.
-    until : {"valid", "stalled", "settled", "ceiling"}
+    until : {"valid", "stalled", "settled", "threshold", "ceiling"}
         When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for
         `untangle.PATIENCE` turns through the moves neither were there fewer inverted elements nor was the smallest
         measure larger;
-        "settled": no vertex moved, which stops every phase; "ceiling": the smallest sine is that of the simplices
-        without a free vertex, or does not rise any more. The last two are phases of smoothing.
+        "settled": no vertex moved, which stops every phase; "threshold": no angle is below it, or nothing gets better
+        any more; "ceiling": the smallest sine is that of the simplices without a free vertex, or does not rise any
+        more. The last three are phases of smoothing.
     only_invalid : bool
         LP moves visit only stars with an inverted element and those whose neighbours moved in the sweep before.
     from_best : bool
         Start from the best mesh met so far, that of the input included, not from the last.
     rings : tuple of (int or None)
         The regions, so many rings around the inverted elements; None: the whole mesh. Those of the energy are tried one
-        after the other; sweeps have one, which counts where only invalid elements may move.
+        after the other; sweeps have one, and leave a mesh alone of which that is more than half. Smoothing that has
+        one keeps to what untangling has moved, and to what is below the threshold.
+    embeds : bool
+        One sweep that puts all vertices of the region at the means of their neighbours at once. It is another start,
+        for meshes that Laplacian sweeps did not mend; the next phase from the best mesh takes the better one.
     """
 
     name: str
     moves: tuple[Move, ...] = ()
     max_sweeps: int | None = None
-    until: Literal["valid", "stalled", "settled", "ceiling"] = "valid"
+    until: Literal["valid", "stalled", "settled", "threshold", "ceiling"] = "valid"
     only_invalid: bool = False
     from_best: bool = False
     rings: tuple[int | None, ...] = ()
+    embeds: bool = False
 
     @property
     def smooths(self) -> bool:
         """Whether it is a phase of smoothing."""
-        return self.until in ("settled", "ceiling")
+        return self.until in ("settled", "threshold", "ceiling")
 
 
 _LAPLACIAN = Phase("Laplacian", (Move.LAPLACIAN,))
 _LP = Phase("LP", (Move.UNTANGLE,))
 _LP_CYCLES = (*(Move.UNTANGLE_HEIGHTS,) * 3, Move.SMART_LAPLACIAN)
+_STALLING = replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled")
+_LP_INVALID = Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True)
+_EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
 _FOLDOVER = Phase("FF", max_sweeps=120, from_best=True, rings=(None,))
+
+
+def _starts(rings: tuple[int, ...] = ()) -> tuple[Phase, ...]:
+    """Give the phases of both starts, Laplacian sweeps and the embedding, in a region."""
+    phases = (_STALLING, _LP_INVALID, _EMBEDDING, replace(_LP_INVALID, from_best=False))
+    near = " near inverted elements" * bool(rings)
+    return tuple(replace(phase, name=phase.name + near, rings=rings) for phase in phases)
+
+
 STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "auto": (
-        replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled"),
-        Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True),
+        *_starts(RINGS),
+        *_starts(),
         replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
         _FOLDOVER,
     ),
@@ -95,6 +119,12 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "FF": (_FOLDOVER,),
 }
 
+# After three passes, where they do not suffice.
+_MORE = Phase(
+    f"{SMOOTHING} the rest", (*(Move.MEAN_RATIO,) * 2, *(Move.COMBINED_SMOOTH,) * PASSES), MORE_SWEEPS,
+    until="threshold", rings=RINGS,
+)  # fmt: skip
+
 # After the passes at the threshold: what makes angles regular, the mean angle, then the few that are below the ceiling.
 _BEST = (
     Phase(f"{SMOOTHING} the mean ratio", (Move.MEAN_RATIO,), RATIO_SWEEPS, until="settled"),
@@ -103,34 +133,44 @@ _BEST = (
 )
 
 
-def plan(strategy: str, smooth: int | Literal["best"] = SMOOTH, only_invalid: bool = False) -> tuple[Phase, ...]:
-    """Return the phases of a strategy and those of smoothing: so many passes, or the best that can be had.
+def plan(strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False) -> tuple[Phase, ...]:
+    """Return the phases of a strategy and those of smoothing.
 
     With `only_invalid` the region of sweeps that stall grows; where nothing is smoothed, vertices that went farther
     than validity takes come back.
+
+    Parameters
+    ----------
+    strategy : str
+    smooth : int, "auto" or "best"
+        So many passes; "auto": `PASSES`, and more where they leave angles below the threshold; "best": what can be had.
 
     Raises
     ------
     ValueError
         There is no such strategy, or no such smoothing.
     """
-    if smooth != "best" and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
-        raise ValueError(f'smooth is {smooth!r}, and must be a number of passes or "best"')
+    if smooth not in ("auto", "best") and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
+        raise ValueError(f'smooth is {smooth!r}, and must be a number of passes, "auto" or "best"')
     if strategy not in STRATEGIES:
         raise ValueError(f"strategy is {strategy!r}, and must be one of {', '.join(STRATEGIES)}")
     untangling = STRATEGIES[strategy]
     if only_invalid:
         untangling = tuple(region for phase in untangling for region in _in_regions(phase))
-    passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), SMOOTH, until="settled", from_best=True)
+    passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), PASSES, until="settled", from_best=True)
     if only_invalid and smooth == 0:
         return (*untangling, _BACK)
     if smooth == "best":
-        return (*untangling, passes, *_BEST)
+        return (*untangling, passes, _MORE, *_BEST)
+    if smooth == "auto":
+        return (*untangling, replace(passes, rings=RINGS), _MORE)
     return (*untangling, replace(passes, max_sweeps=smooth))
 
 
 def _in_regions(phase: Phase) -> Iterator[Phase]:
-    """Give a phase of sweeps that may stall once for each region."""
+    """Give a phase of sweeps that may stall once for each region, and no other start."""
+    if phase.embeds or (phase.moves and phase.rings) or (phase.only_invalid and not phase.from_best):
+        return
     if not (phase.moves and phase.only_invalid):
         yield phase
         return

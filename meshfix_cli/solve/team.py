@@ -52,6 +52,9 @@ class Team(Protocol):
     def shared(self, mask: Mask) -> Mask:
         """Return a mask (n,) with what the owners of its vertices say of them."""
 
+    def grown(self, mask: Mask, rings: int) -> Mask:
+        """Return a mask (n,) with `rings` rings of neighbours around its vertices."""
+
     def sweep(self, points: Array, states: NDArray[np.uint8]) -> Iterator[NDArray[np.int32]]:
         """Yield blocks of one colour after the other; points and states follow what others relocate meanwhile."""
 
@@ -83,6 +86,10 @@ class Alone:
     def shared(self, mask: Mask) -> Mask:
         """Return the mask."""
         return mask
+
+    def grown(self, mask: Mask, rings: int) -> Mask:
+        """Return the mask and the rings around it."""
+        return self.stars.grown(mask, rings).view(bool)
 
     def sweep(self, points: Array, states: NDArray[np.uint8]) -> Iterator[NDArray[np.int32]]:
         """Yield the blocks of each colour."""

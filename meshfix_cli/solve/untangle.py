@@ -5,33 +5,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
-from functools import partial
-from itertools import cycle, islice
-from typing import TYPE_CHECKING, Literal
+from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli import kernels
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.solve.records import Outcome, SweepRecord
-from meshfix_cli.solve.strategies import SMOOTH, SMOOTHING, SWEEPS, THRESHOLD, Move, Phase, plan
+from meshfix_cli.solve.run import Run
+from meshfix_cli.solve.strategies import SMOOTH, SMOOTHING, SWEEPS, THRESHOLD, Phase, Smooth, plan
 from meshfix_cli.solve.team import Alone
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.solve.team import Team
 
-GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone
-ANGLE_STEPS = 2.0**32  # of a radian
-FLOOR = 1  # percentile of the smallest angles: the sweeps for the mean angle let no element fall below it
-RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
-RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
-RAISE_PATIENCE = 2
 PATIENCE = 3  # turns through the moves of a phase without progress after which it has stalled
-PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
-NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
 
 
 def steps(
@@ -80,7 +70,7 @@ def steps(
     if not (0 <= degrees <= 90 and max_move >= 0):
         raise ValueError("the threshold must be from 0 to 90 degrees, and max_move not negative")
     team = Alone(mesh, threads) if team is None else team
-    run = _Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, hopeless, threads, team)
+    run = Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, hopeless, threads, team)
     yield run.mesh, run.record
     phases = tuple(phases)
     to_the_ceiling = any(phase.until == "ceiling" for phase in phases)
@@ -88,7 +78,9 @@ def steps(
         return
     for phase in phases:
         untangling = not phase.smooths
-        if untangling and run.is_done(phase):
+        if phase.from_best and run.choose():
+            yield run.mesh, run.record
+        if untangling and not run.enter(phase):
             continue
         limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
         if untangling and sweeps is not None:
@@ -109,236 +101,11 @@ def steps(
             if stalls and waited == PATIENCE * max(1, len(phase.moves)):
                 break
             run.clock = time.perf_counter()
+    if run.choose():
+        yield run.mesh, run.record
     lost = run.record.rank > run.first[1].rank or (to_the_ceiling and run.first[1].inverted == 0 and not run.gained())
     if lost and run.go_back(untangling=False):
         yield run.mesh, run.record
-
-
-def _raised(sine2: float, degrees: float) -> float:
-    """Return the sine^2 of an angle that is larger by some degrees."""
-    return math.sin(min(math.asin(math.sqrt(sine2)) + math.radians(degrees), math.pi / 2)) ** 2
-
-
-def _due(vertices: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """States for a sweep that visits these vertices (n,)."""
-    return vertices.astype("u1") * kernels.DUE
-
-
-class _Run:
-    """The positions between two sweeps, and the best so far by what can be mended: simplices that have a free vertex.
-
-    All arrays are in the order of `Topology.connectivity`; of what several processes hold, `team` finds one answer.
-    """
-
-    def __init__(
-        self,
-        mesh: Mesh,
-        threshold_sine2: float,
-        max_move: float,
-        only_invalid: bool,
-        hopeless: NDArray[np.bool_] | None,
-        threads: int,
-        team: Team,
-    ) -> None:
-        self.clock = time.perf_counter()
-        self.input, self.threshold_sine2, self.threads, self.team = mesh, threshold_sine2, threads, team
-        self.stars, self.max_move = mesh.topology.stars(threads), max_move
-        self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
-        stuck = mesh.stuck(threads)
-        fixed = self.stars.simplices[stuck]
-        inverted = kernels.check(self.points, fixed, threads)[0]
-        self.stuck = np.delete(fixed, inverted, axis=0)
-        self.mendable, self.own = self.stars.simplices, team.own_simplices
-        lost = int(self.own[stuck[inverted]].sum())
-        self.hopeless = np.zeros(len(self.mendable), dtype=bool) if hopeless is None else hopeless
-        if len(inverted):
-            self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
-            self.own = np.delete(self.own, stuck[inverted])
-            self.hopeless = np.delete(self.hopeless, stuck[inverted])
-        self.beyond_repair = team.total(lost), team.least(kernels.check(self.points, fixed[inverted], threads)[1])
-        self.some_are_hopeless = team.total(int(self.hopeless.any())) > 0
-        self.changed = np.zeros(len(self.points), dtype=bool)
-        self._check()
-        self.record = self._record("input", 0, 0)
-        self.first = self.best = (self.points, self.record, self._rank())
-        self.fewest, self.largest = self._rank()[0], self.measure
-        self.only_invalid = only_invalid
-        self.near = self.free & self._broken() if only_invalid else self.free
-        # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
-        self.min_measure = -math.inf if self.record.inverted else self.measure
-        self.floor = self.min_measure
-
-    @property
-    def mesh(self) -> Mesh:
-        """The mesh at these positions."""
-        return self.input if self.points is self.first[0] else self.input.with_vertices(self.points)
-
-    def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        """Yield the points (k, d) after each sweep; the caller adds them before it asks for the next."""
-        self.changed[:] = False
-        if not phase.moves:
-            return self._minimisations(phase)
-        if self.only_invalid and phase.rings:
-            rings = phase.rings[0]
-            self.near = self.free if rings is None else self._grown(self.near | self._broken(), rings)
-            self.fewest, self.largest = self.left, self.measure  # what a smaller region reached is no measure
-        near = self._grown(self.near, NEAR) if self.only_invalid and phase.smooths else self.near
-        return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
-
-    def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
-        """Take the points (k, d) of a sweep; return whether there was progress.
-
-        Progress is fewer inverted elements than ever in the run, or a smallest measure that is larger by `PROGRESS`.
-        """
-        self.changed = kernels.moved(self.points, points, self.threads).view(bool)
-        if self.only_invalid and not phase.moves:
-            self.near = self.near | self.changed
-        self.points = points
-        self._check()
-        sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
-        self.record = self._record(
-            phase.name, sweep, self.team.total(int((self.changed & self.team.own_vertices).sum()))
-        )
-        self.best = min(self.best, (self.points, self.record, self._rank()), key=lambda one: one[2])
-        progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
-        self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
-        return progress
-
-    def is_done(self, phase: Phase) -> bool:
-        """Whether nothing is left for a phase of untangling: sweeps are cheap, the energy needs a promise."""
-        return (self.left if phase.moves else self.promising) == 0
-
-    def gained(self) -> bool:
-        """Whether the mean or the smallest of the smallest angles is larger than in the input, by more than `GAIN`."""
-        before, after = self._angles(self.first[0]), self._angles(self.points)
-        # As integers, whose sum does not depend on the order.
-        steps = [int((angles * ANGLE_STEPS).astype("i8")[self.own].sum()) for angles in (before, after)]
-        mean = self.team.total(steps[1] - steps[0]) / ANGLE_STEPS / self.team.total(int(self.own.sum()))
-        rise = self._least(after) - self._least(before)
-        return max(mean, rise) > math.radians(GAIN)
-
-    def meets(self, degrees: float) -> bool:
-        """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-        free = np.delete(self.stars.simplices, self.input.stuck(self.threads), axis=0)
-        return self._least(kernels.angles(self.points, free, self.threads)[0]) >= math.radians(degrees)
-
-    def go_back(self, untangling: bool) -> bool:
-        """Return to the best positions; False: they are the last.
-
-        When untangling is over and left as many inverted elements as there were, nothing was mended, and the best are
-        those of the input: what is well in it was moved for nothing.
-        """
-        mended = self.best[2][0] < self.first[2][0]
-        points, record, _ = self.best if untangling or mended else self.first
-        if points is self.points:
-            return False
-        self.points = points
-        self._check()
-        self.record = replace(record, phase="best", moved=0, seconds=0.0)
-        return True
-
-    def _check(self) -> None:
-        """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure.
-
-        `promising` is how many of them are worth the energy.
-        """
-        self.inverted, smallest = kernels.check(self.points, self.mendable, self.threads)
-        self.left = self.promising = self.team.total(int(self.own[self.inverted].sum()))
-        if self.some_are_hopeless:
-            own = self.own[self.inverted] & ~self.hopeless[self.inverted]
-            self.promising = self.team.total(int(own.sum()))
-        self.measure = self.team.least(smallest)
-
-    def _rank(self) -> tuple[int, float]:
-        return self.left, -self.measure
-
-    def _record(self, phase: str, sweep: int, moved: int) -> SweepRecord:
-        inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
-        return SweepRecord(phase, sweep, inverted, measure, moved, time.perf_counter() - self.clock)
-
-    def _broken(self) -> NDArray[np.bool_]:
-        """(n,) bool: the vertices of inverted simplices that can be mended."""
-        mask = self.changed & False
-        mask[self.mendable[self.inverted]] = True
-        return self.team.shared(mask)
-
-    def _grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
-        """(n,) bool: free vertices among these and `rings` rings of neighbours around them."""
-        return self.free & self.stars.grown(vertices, rings).view(bool)
-
-    def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
-        near = near & self.team.own_vertices
-        threshold, states = self._threshold_sine2(phase), _due(near)
-        self.floor = self.measure if Move.COME_BACK in phase.moves else self.min_measure
-        for move in cycle(phase.moves):
-            if len(phase.moves) > 1:  # what was visited by one move is due for the next
-                states = _due(near)
-            if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
-                states = _due(near & (self._broken() | self._grown(self.changed, 1)))
-            yield self._relocated(move, states, threshold)
-
-    def _raisings(self, move: Move, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
-        ceiling = self._min_sine2(self.stuck)
-        smallest, waited = self._min_sine2(self.mendable), 0
-        while smallest < ceiling and waited < RAISE_PATIENCE:
-            yield self._relocated(move, _due(near & self.team.own_vertices), _raised(smallest, RAISE))
-            now = self._min_sine2(self.mendable)
-            waited = 0 if now > _raised(smallest, RISE) else waited + 1
-            smallest = max(smallest, now)
-
-    def _relocated(self, move: Move, states: NDArray[np.uint8], threshold: float) -> NDArray[np.float64]:
-        points = self.points.copy()
-        for blocks in self.team.sweep(points, states):
-            kernels.relocate(
-                move, points, states, self.stars, blocks, threshold, self.floor, self.first[0], self.max_move,
-                self.threads,
-            )  # fmt: skip
-        return points
-
-    def _threshold_sine2(self, phase: Phase) -> float:
-        """Return that of the user or, for the means, the floor below which nothing may fall, if that is higher."""
-        floor = 0.0
-        if Move.MEAN_RATIO in phase.moves:
-            floor = self._min_sine2(self.mendable)
-        elif Move.MEAN_ANGLE in phase.moves:
-            floor = math.sin(self.team.ranked(self._angles(self.points)[self.own], FLOOR)) ** 2
-        return max(self.threshold_sine2, floor)
-
-    def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
-        return self.team.least(kernels.min_sine2(self.points, simplices, self.threads))
-
-    def _angles(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the smallest angle of each simplex that can be mended, in radians."""
-        return kernels.angles(points, self.mendable, self.threads)[0]
-
-    def _least(self, angles: NDArray[np.float64]) -> float:
-        return self.team.least(float(angles.min(initial=math.pi)))
-
-    def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        compute = partial(_minimisations, phase.rings, self.max_move, self.threads)
-        return self.team.of_whole(compute, self.points, self.first[0], self.free, self._broken())
-
-
-def _minimisations(
-    regions: tuple[int | None, ...],
-    max_move: float,
-    threads: int,
-    stars: kernels.Connectivity,
-    points: NDArray[np.float64],
-    start: NDArray[np.float64],
-    free: NDArray[np.bool_],
-    broken: NDArray[np.bool_],
-) -> Iterator[NDArray[np.float64]]:
-    """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
-    from meshfix_cli.solve.foldover import Reach, minimisations
-
-    for rings in regions:
-        near = free if rings is None else free & stars.grown(broken, rings).view(bool)
-        if rings is not None and 2 * near.sum() > free.sum():
-            return  # as good as the whole mesh
-        for moved in minimisations(points, stars, near, Reach(start, max_move), threads):
-            points = moved
-            yield points
 
 
 def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tuple[SweepRecord, ...]]:
@@ -359,7 +126,7 @@ def untangle(
     strategy: str = "auto",
     *,
     sweeps: int | None = None,
-    smooth: int | Literal["best"] = SMOOTH,
+    smooth: Smooth = SMOOTH,
     threshold: float | None = None,
     max_move: float = math.inf,
     only_invalid: bool = False,
@@ -372,10 +139,11 @@ def untangle(
     mesh : Mesh
     strategy : str
         A key of `STRATEGIES`.
-    smooth : int or "best"
-        Smoothing passes. "best": `SMOOTH` of them, `RATIO_SWEEPS` sweeps for the mean ratios, `ANGLE_SWEEPS` for the
-        smallest angles of all simplices, and sweeps that raise the smallest of all until it is that of the simplices
-        without a free vertex or rises no more.
+    smooth : int, "auto" or "best"
+        Smoothing passes. "auto": `PASSES` of them, then, while something is below the threshold and gets better, sweeps
+        for the mean ratios and more passes around it. "best": `PASSES` of them, `RATIO_SWEEPS` sweeps for the mean
+        ratios, `ANGLE_SWEEPS` for the smallest angles of all simplices, and sweeps that raise the smallest of all until
+        it is that of the simplices without a free vertex or rises no more.
     sweeps, threshold, max_move, only_invalid
         See `steps`.
     threads : int
@@ -394,8 +162,9 @@ def untangle(
     Notes
     -----
     Source: section 4 for LS, US, CS and LUS, `foldover.py` for FF. "auto" is Laplacian sweeps until they stall; from
-    the best of those meshes cycles of LP sweeps on the stars that are still invalid; then FF, first in the smallest
-    region that can be solved.
+    the best of those meshes cycles of LP sweeps on the stars that are still invalid. Where the Laplacian sweeps left
+    some, the graph's embedding is a second start, and the better one is kept. Both are first tried near the inverted
+    elements, where these are few; FF follows, first in the smallest region that can be solved.
     """
     phases, obstacles = plan(strategy, smooth, only_invalid), find_obstacles(mesh, threads)
     run = steps(

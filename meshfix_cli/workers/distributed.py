@@ -345,6 +345,12 @@ class Ranks:
                 result[vertices] = values[:, 0] != 0
         return result
 
+    def grown(self, mask: Mask, rings: int) -> Mask:
+        """Return the mask and the rings around it, of which the others tell where they lead back into this part."""
+        for _ in range(rings):
+            mask = self.shared(self.stars.grown(mask, 1).view(bool))
+        return mask
+
     def sweep(self, points: Array, states: NDArray[np.uint8]) -> Iterator[Numbers]:
         """Yield the blocks of each colour: first those at the rims, whose vertices travel while the others move."""
         for halo in self.halos:

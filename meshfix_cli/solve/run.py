@@ -1,0 +1,386 @@
+"""The positions between two sweeps of a run, and what is done to them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from itertools import cycle
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.solve.records import SweepRecord
+from meshfix_cli.solve.strategies import PASSES, Move, Phase
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
+    from meshfix_cli.solve.team import Team
+
+GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone
+ANGLE_STEPS = 2.0**32  # of a radian
+FLOOR = 1  # percentile of the smallest angles: the sweeps for the mean angle let no element fall below it
+RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
+RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
+RAISE_PATIENCE = 2
+PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
+NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
+EASY = 3  # sweeps: a mesh that took more to untangle is smoothed up to the goal, even if nothing is below the threshold
+GOAL = {2: 1.3, 3: 1.6}  # times the threshold: up to there, where three passes of smoothing do not suffice
+GOAL_RINGS = 4  # around the elements below the goal that are smoothed
+GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
+GOAL_PATIENCE = 3
+_Start = tuple[NDArray[np.float64], SweepRecord, tuple[int, float]]
+WITHIN = 1 - 1e-12  # of the distance that vertices may go, whatever is rounded
+SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
+
+
+def _raised(sine2: float, degrees: float) -> float:
+    """Return the sine^2 of an angle that is larger by some degrees."""
+    return math.sin(min(math.asin(math.sqrt(sine2)) + math.radians(degrees), math.pi / 2)) ** 2
+
+
+def _due(vertices: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """States for a sweep that visits these vertices (n,)."""
+    return vertices.astype("u1") * kernels.DUE
+
+
+class Run:
+    """The positions between two sweeps, and the best so far by what can be mended: simplices that have a free vertex.
+
+    All arrays are in the order of `Topology.connectivity`; of what several processes hold, `team` finds one answer.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        threshold_sine2: float,
+        max_move: float,
+        only_invalid: bool,
+        hopeless: NDArray[np.bool_] | None,
+        threads: int,
+        team: Team,
+    ) -> None:
+        self.clock = time.perf_counter()
+        self.threshold = math.asin(math.sqrt(threshold_sine2))
+        self.input, self.threshold_sine2, self.threads, self.team = mesh, threshold_sine2, threads, team
+        self.stars, self.max_move = mesh.topology.stars(threads), max_move
+        self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
+        stuck = mesh.stuck(threads)
+        fixed = self.stars.simplices[stuck]
+        inverted = kernels.check(self.points, fixed, threads)[0]
+        self.stuck = np.delete(fixed, inverted, axis=0)
+        self.mendable, self.own = self.stars.simplices, team.own_simplices
+        lost = int(self.own[stuck[inverted]].sum())
+        self.hopeless = np.zeros(len(self.mendable), dtype=bool) if hopeless is None else hopeless
+        if len(inverted):
+            self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
+            self.own = np.delete(self.own, stuck[inverted])
+            self.hopeless = np.delete(self.hopeless, stuck[inverted])
+        self.beyond_repair = team.total(lost), team.least(kernels.check(self.points, fixed[inverted], threads)[1])
+        self.some_are_hopeless = team.total(int(self.hopeless.any())) > 0
+        self.changed = np.zeros(len(self.points), dtype=bool)
+        self._check()
+        self.record = self._record("input", 0, 0)
+        self.first = (self.points, self.record, self._rank())
+        self.best: _Start | None = self.first
+        self.fewest, self.largest = self._rank()[0], self.measure
+        self.only_invalid = only_invalid
+        self.broken = self._broken()
+        self.near = self.free & self.broken if only_invalid else self.free
+        self.rival: _Start | None = None
+        self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
+        self.untangling = 0  # sweeps
+        # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
+        self.min_measure = -math.inf if self.record.inverted else self.measure
+        self.floor = self.min_measure
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh at these positions."""
+        return self.input if self.points is self.first[0] else self.input.with_vertices(self.points)
+
+    def enter(self, phase: Phase) -> bool:
+        """Prepare a phase of untangling; False: it has nothing to do, or its region is as good as the whole."""
+        if Move.LAPLACIAN in phase.moves:
+            self.hard = False
+        if not self.hard if phase.embeds else self.is_done(phase):
+            return False
+        if self.only_invalid or not (phase.moves or phase.embeds):
+            return True
+        near = self._grown(self.broken, phase.rings[0] or 0) if phase.rings else self.free
+        if phase.rings and 2 * self._count(near) > self._count(self.free):
+            return False
+        self.near = near
+        return True
+
+    def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        """Yield the points (k, d) after each sweep; the caller adds them before it asks for the next."""
+        self.changed[:] = False
+        if phase.embeds:
+            return self._another_start()
+        if not phase.moves:
+            return self._minimisations(phase)
+        if self.only_invalid and phase.rings and not phase.smooths:
+            rings = phase.rings[0]
+            self.near = self.free if rings is None else self._grown(self.near | self._broken(), rings)
+            self.fewest, self.largest = self.left, self.measure  # what a smaller region reached is no measure
+        near = self._smoothed(phase) if phase.smooths else self.near
+        if phase.until == "threshold":
+            return self._mendings(phase, near)
+        return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
+
+    def _smoothed(self, phase: Phase) -> NDArray[np.bool_]:
+        """(n,) bool: the vertices that a phase of smoothing may move."""
+        if self.only_invalid:
+            return self._grown(self.near, NEAR)
+        if not phase.rings or self.near is self.free or phase.until == "threshold":
+            return self.free
+        return self._grown(self.near | self._of(self._angles(self.points) < self.threshold), 0)
+
+    def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
+        """Take the points (k, d) of a sweep; return whether there was progress.
+
+        Progress is fewer inverted elements than ever in the run, or a smallest measure that is larger by `PROGRESS`.
+        """
+        self.changed = kernels.moved(self.points, points, self.threads).view(bool)
+        if self.only_invalid and not phase.moves:
+            self.near = self.near | self.changed
+        self.points = points
+        self._check()
+        sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
+        self.record = self._record(phase.name, sweep, self._count(self.changed))
+        self.untangling += not phase.smooths
+        if Move.LAPLACIAN in phase.moves:
+            self.hard = self.promising > 0 or sweep > EASY
+        now = (self.points, self.record, self._rank())
+        self.best = now if self.best is None else min(self.best, now, key=lambda one: one[2])
+        progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
+        self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
+        return progress
+
+    def choose(self) -> bool:
+        """Go on with the better one of two starts: by what is inverted, else after a few passes; False: it is this."""
+        if self.rival is None or self.best is None:
+            return False
+        one, other, self.rival = self.rival, self.best, None
+        self.best = min(one, other, key=lambda start: start[2])
+        if one[2][0] == other[2][0] == 0:
+            (smallest, mean), (its_smallest, its_mean) = self._after_passes(one[0]), self._after_passes(other[0])
+            same = abs(smallest - its_smallest) < math.radians(SAME)
+            self.best = one if (mean >= its_mean if same else smallest > its_smallest) else other
+        return self._return_to(*self.best[:2])
+
+    def _after_passes(self, points: NDArray[np.float64]) -> tuple[float, int]:
+        """Return the smallest of the smallest angles, in radians, and their sum, in steps."""
+        for _ in range(PASSES):
+            points = self._relocated(points, Move.COMBINED_SMOOTH, _due(self.near & self.team.own_vertices))
+        angles = self._angles(points)
+        return self._least(angles), self.team.total(self._steps(angles))
+
+    def is_done(self, phase: Phase) -> bool:
+        """Whether nothing is left for a phase of untangling: sweeps are cheap, the energy needs a promise."""
+        return (self.left if phase.moves else self.promising) == 0
+
+    def gained(self) -> bool:
+        """Whether the mean or the smallest of the smallest angles is larger than in the input, by more than `GAIN`."""
+        before, after = self._angles(self.first[0]), self._angles(self.points)
+        mean = (
+            self.team.total(self._steps(after) - self._steps(before))
+            / ANGLE_STEPS
+            / self.team.total(int(self.own.sum()))
+        )
+        rise = self._least(after) - self._least(before)
+        return max(mean, rise) > math.radians(GAIN)
+
+    def meets(self, degrees: float) -> bool:
+        """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
+        free = np.delete(self.stars.simplices, self.input.stuck(self.threads), axis=0)
+        return self._least(kernels.angles(self.points, free, self.threads)[0]) >= math.radians(degrees)
+
+    def go_back(self, untangling: bool) -> bool:
+        """Return to the best positions; False: they are the last.
+
+        When untangling is over and left as many inverted elements as there were, nothing was mended, and the best are
+        those of the input: what is well in it was moved for nothing.
+        """
+        assert self.best is not None
+        mended = self.best[2][0] < self.first[2][0]
+        points, record, _ = self.best if untangling or mended else self.first
+        return self._return_to(points, record)
+
+    def _return_to(self, points: NDArray[np.float64], record: SweepRecord) -> bool:
+        if points is self.points:
+            return False
+        self.points = points
+        self._check()
+        self.record = replace(record, phase="best", moved=0, seconds=0.0)
+        return True
+
+    def _check(self) -> None:
+        """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure.
+
+        `promising` is how many of them are worth the energy.
+        """
+        self.inverted, smallest = kernels.check(self.points, self.mendable, self.threads)
+        self.left = self.promising = self.team.total(int(self.own[self.inverted].sum()))
+        if self.some_are_hopeless:
+            own = self.own[self.inverted] & ~self.hopeless[self.inverted]
+            self.promising = self.team.total(int(own.sum()))
+        self.measure = self.team.least(smallest)
+
+    def _rank(self) -> tuple[int, float]:
+        return self.left, -self.measure
+
+    def _record(self, phase: str, sweep: int, moved: int) -> SweepRecord:
+        inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
+        return SweepRecord(phase, sweep, inverted, measure, moved, time.perf_counter() - self.clock)
+
+    def _count(self, vertices: NDArray[np.bool_]) -> int:
+        return self.team.total(int((vertices & self.team.own_vertices).sum()))
+
+    def _broken(self) -> NDArray[np.bool_]:
+        """(n,) bool: the vertices of inverted simplices that can be mended."""
+        return self._of(self.inverted)
+
+    def _of(self, simplices: NDArray[np.integer] | NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n,) bool: the vertices of some simplices that can be mended."""
+        mask = np.zeros(len(self.points), dtype=bool)
+        mask[self.mendable[simplices]] = True
+        return self.team.shared(mask)
+
+    def _grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
+        """(n,) bool: free vertices among these and `rings` rings of neighbours around them."""
+        return self.free & self.team.grown(vertices, rings)
+
+    def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        near = near & self.team.own_vertices
+        threshold, states = self._floor_sine2(phase), _due(near)
+        self.floor = self.measure if Move.COME_BACK in phase.moves else self.min_measure
+        for move in cycle(phase.moves):
+            if len(phase.moves) > 1:  # what was visited by one move is due for the next
+                states = _due(near)
+            if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
+                states = _due(near & (self._broken() | self._grown(self.changed, 1)))
+            yield self._relocated(self.points, move, states, threshold)
+
+    def _another_start(self) -> Iterator[NDArray[np.float64]]:
+        self.rival, self.best = self.best, None
+        self.fewest, self.largest = len(self.mendable), -math.inf
+        compute = partial(_embedded, self.max_move)
+        yield from self.team.of_whole(compute, self.points, self.first[0], self.near)
+
+    def _mendings(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        """Yield sweeps around what is below the goal, turn by turn, as long as that becomes less or better."""
+        self.floor = self.min_measure
+        goal = min(GOAL[self.points.shape[1]] * self.threshold, math.pi / 2)
+        fewest, largest, waited = len(self.mendable), -math.inf, 0
+        angles = self._angles(self.points)
+        if self.untangling <= EASY and self._least(angles) >= self.threshold:
+            return
+        while True:
+            below, smallest = self.team.total(int((angles < goal)[self.own].sum())), self._least(angles)
+            rises = below < fewest or smallest > largest + math.radians(GOAL_RISE)
+            fewest, largest, waited = min(fewest, below), max(largest, smallest), 0 if rises else waited + 1
+            if below == 0 or waited == GOAL_PATIENCE:
+                return
+            due = near & self._grown(self._of(angles < goal), GOAL_RINGS) & self.team.own_vertices
+            states, last = _due(due), phase.moves[0]
+            for move in phase.moves:
+                states, last = states if move is last else _due(due), move
+                floor = self._min_sine2(self.mendable) if move is Move.MEAN_RATIO else math.sin(goal) ** 2
+                yield self._relocated(self.points, move, states, floor)
+            angles = self._angles(self.points)
+
+    def _raisings(self, move: Move, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+        ceiling = self._min_sine2(self.stuck)
+        smallest, waited = self._min_sine2(self.mendable), 0
+        while smallest < ceiling and waited < RAISE_PATIENCE:
+            yield self._relocated(self.points, move, _due(near & self.team.own_vertices), _raised(smallest, RAISE))
+            now = self._min_sine2(self.mendable)
+            waited = 0 if now > _raised(smallest, RISE) else waited + 1
+            smallest = max(smallest, now)
+
+    def _relocated(
+        self, points: NDArray[np.float64], move: Move, states: NDArray[np.uint8], threshold_sine2: float | None = None
+    ) -> NDArray[np.float64]:
+        """Return the points (k, d) after a sweep, which keeps account in `states`; the threshold is the user's."""
+        threshold_sine2 = self.threshold_sine2 if threshold_sine2 is None else threshold_sine2
+        points = points.copy()
+        for blocks in self.team.sweep(points, states):
+            kernels.relocate(
+                move, points, states, self.stars, blocks, threshold_sine2, self.floor, self.first[0], self.max_move,
+                self.threads,
+            )  # fmt: skip
+        return points
+
+    def _floor_sine2(self, phase: Phase) -> float:
+        """Return that of the user or, for the means, the floor below which nothing may fall, if that is higher."""
+        floor = 0.0
+        if Move.MEAN_RATIO in phase.moves:
+            floor = self._min_sine2(self.mendable)
+        elif Move.MEAN_ANGLE in phase.moves:
+            floor = math.sin(self.team.ranked(self._angles(self.points)[self.own], FLOOR)) ** 2
+        return max(self.threshold_sine2, floor)
+
+    def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
+        return self.team.least(kernels.min_sine2(self.points, simplices, self.threads))
+
+    def _angles(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the smallest angle of each simplex that can be mended, in radians."""
+        return kernels.angles(points, self.mendable, self.threads)[0]
+
+    def _steps(self, angles: NDArray[np.float64]) -> int:
+        """Return the sum of the own simplices' angles as an integer, which does not depend on the order."""
+        return int((angles * ANGLE_STEPS).astype("i8")[self.own].sum())
+
+    def _least(self, angles: NDArray[np.float64]) -> float:
+        return self.team.least(float(angles.min(initial=math.pi)))
+
+    def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        compute = partial(_minimisations, phase.rings, self.max_move, self.threads)
+        return self.team.of_whole(compute, self.points, self.first[0], self.free, self._broken())
+
+
+def _embedded(
+    max_move: float,
+    stars: kernels.Connectivity,
+    points: NDArray[np.float64],
+    start: NDArray[np.float64],
+    near: NDArray[np.bool_],
+) -> Iterator[NDArray[np.float64]]:
+    """Yield the points with those near by in the graph's embedding, as far as they may go."""
+    from meshfix_cli.solve.foldover import _embedding
+
+    embedded = _embedding(points, stars, near)
+    way = embedded - start
+    length = np.linalg.norm(way, axis=1)
+    far = length > max_move
+    embedded[far] = start[far] + (max_move * WITHIN / length[far])[:, None] * way[far]
+    yield embedded
+
+
+def _minimisations(
+    regions: tuple[int | None, ...],
+    max_move: float,
+    threads: int,
+    stars: kernels.Connectivity,
+    points: NDArray[np.float64],
+    start: NDArray[np.float64],
+    free: NDArray[np.bool_],
+    broken: NDArray[np.bool_],
+) -> Iterator[NDArray[np.float64]]:
+    """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
+    from meshfix_cli.solve.foldover import Reach, minimisations
+
+    for rings in regions:
+        near = free if rings is None else free & stars.grown(broken, rings).view(bool)
+        if rings is not None and 2 * near.sum() > free.sum():
+            return  # as good as the whole mesh
+        for moved in minimisations(points, stars, near, Reach(start, max_move), threads):
+            points = moved
+            yield points

@@ -1,0 +1,101 @@
+"""The default: where it begins, which start it keeps, and when its smoothing ends."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from geometries import GEOMETRIES, grid
+from meshes import tangle
+
+from meshfix_cli import Mesh, untangle
+from meshfix_cli.quality.formulas import evaluate
+from meshfix_cli.quality.summary import summarise
+from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, plan
+from meshfix_cli.solve.untangle import drain, steps
+
+
+def collapsed(name: str) -> tuple[Mesh, Mesh]:
+    """A mesh, and the same with all free vertices in one point."""
+    mesh = Mesh.build(*GEOMETRIES[name]())
+    middle = mesh.points[mesh.movable].mean(axis=0)
+    return mesh, mesh.with_points(np.where(mesh.movable[:, None], middle, mesh.points))
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_what_lies_far_from_few_inverted_elements_keeps_its_bits(dimension: int) -> None:
+    axes = [np.linspace(0, 1, 41)] * 2 if dimension == 2 else [np.linspace(0, 1, 19)] * 3
+    mesh = Mesh.build(*grid(*axes))
+    points = mesh.points.copy()
+    vertex = int(np.argmin(np.linalg.norm(points - 0.3, axis=1)))
+    points[vertex] += 0.11
+    tangled = mesh.with_points(points)
+    assert tangled.check()[0] > 0
+    outcome = untangle(tangled)
+    assert outcome.valid
+    moved = (outcome.after.points != points).any(axis=1)
+    broken = np.zeros(len(points), dtype=bool)
+    broken[mesh.topology.simplices[summarise(tangled).inverted_elements]] = True
+    assert moved[vertex]
+    assert not (moved & ~mesh.topology.grown(broken, 10)).any()
+    assert summarise(outcome.after).min_angle >= 0.8 * summarise(mesh).min_angle
+
+
+def test_a_tangle_all_over_the_mesh_is_not_begun_in_a_part(mesh: Mesh) -> None:
+    assert "Laplacian" in {record.phase for record in untangle(tangle(mesh, 100, 2)).records}
+
+
+@pytest.mark.parametrize("name", ["L-shaped plate", "box with pipes", "sphere shell"])
+def test_the_better_start_is_kept(name: str) -> None:
+    """Either start alone, Laplacian sweeps or the embedding, ends no better than the two of which one is chosen."""
+    _, tangled = collapsed(name)
+    both = [phase for phase in STRATEGIES["auto"] if phase.moves or phase.embeds]
+    first = [phase for phase in both if phase.from_best]
+    passes = plan("auto", PASSES)[-1:]
+    outcomes = [drain(steps(tangled, [*phases, *passes])) for phases in (both, first)]
+    (_, _, chosen, records), (_, _, alone, _) = outcomes
+    assert any(record.phase == "embedding" for record in records)
+    one, other = summarise(chosen), summarise(alone)
+    assert one.inverted <= other.inverted
+    if one.inverted == other.inverted == 0:
+        assert one.min_angle > other.min_angle - 0.1
+
+
+def test_the_embedding_stays_within_the_bound(plate: Mesh) -> None:
+    tangled = tangle(plate, 100, 8)
+    h = tangled.mean_edge_length()
+    for bound in (0.5 * h, 4 * h):
+        meshes = [mesh for mesh, record in steps(tangled, STRATEGIES["auto"], max_move=bound)]
+        for mesh in meshes:
+            assert np.linalg.norm(mesh.points - tangled.points, axis=1).max() <= bound
+
+
+@pytest.mark.parametrize("name", ["L-shaped plate", "O-grid", "block", "Kuhn cube"])
+def test_no_result_after_a_hard_tangle_is_poor(name: str) -> None:
+    mesh, tangled = collapsed(name)
+    outcome = untangle(tangled)
+    assert outcome.valid
+    assert summarise(outcome.after).min_angle >= 0.5 * summarise(mesh).min_angle
+    free = mesh.movable[mesh.topology.simplices].any(axis=1)
+    assert evaluate("min_angle", outcome.after)[free].min() >= THRESHOLD[mesh.dimension]
+
+
+def test_smoothing_goes_on_only_where_three_passes_leave_something(mesh: Mesh) -> None:
+    free = mesh.movable[mesh.topology.simplices].any(axis=1)
+    went_on = set()
+    for threshold in (2.0, 5.0, 40.0):
+        tangled = tangle(mesh, 5, 0.5)
+        smallest = evaluate("min_angle", untangle(tangled, smooth=PASSES, threshold=threshold).after)[free].min()
+        phases = {record.phase for record in untangle(tangled, threshold=threshold).records}
+        assert (f"{SMOOTHING} the rest" in phases) == (smallest < threshold)
+        went_on.add(smallest < threshold)
+    assert went_on == {False, True}
+
+
+def test_a_number_of_passes_is_exact(mesh: Mesh) -> None:
+    for passes in (1, PASSES, 5):
+        phases = plan("auto", passes)
+        assert [(phase.moves, phase.max_sweeps) for phase in phases if phase.smooths] == [
+            ((Move.COMBINED_SMOOTH,), passes)
+        ]
+        records = untangle(tangle(mesh, 100, 8), smooth=passes).records
+        assert sum(record.phase.startswith(SMOOTHING) for record in records) == passes

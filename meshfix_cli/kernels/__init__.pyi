@@ -148,6 +148,9 @@ def linear_program(
 def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
     """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
 
+def embedding(points: Float64, mesh: Connectivity, free: NDArray[np.bool_], threads: int) -> Float64:
+    """Return the points (n, d) with each free one (n,) at the mean of its neighbours; needs the stars."""
+
 def folds(points: Float64, facets: Int32, shared: Uint8, threads: int) -> Int32:
     """Pairs (k, 2) of oriented facets (f, d) that lie upon each other, their insides on the same side.
 
@@ -161,13 +164,33 @@ def enclosing(points: Float64, facets: Int32, parts: Int32, places: Float64, own
     """
 
 class Foldover:
-    """The foldover-free energy of simplices and its gradient; see moves/foldover.hpp."""
+    """Minimises the foldover-free energy, for one eps after the other; see moves/foldover_problem.hpp."""
 
-    def __init__(self, simplices: Int32, n: int) -> None: ...
-    def evaluate(
-        self, points: Float64, sizes: Float64, eps: float, weight: float, free: int, threads: int
-    ) -> tuple[float, Float64, float]:
-        """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
+    def __init__(
+        self, points: Float64, simplices: Int32, sizes: Float64, centres: Float64, radius: float, threads: int
+    ) -> None:
+        """Take a region's points (n, d), the free ones first; each free one has a ball around its centre (free, d).
+
+        `sizes` (m,) are the d-th roots of the determinants that the simplices (m, d+1) should have; all in model units.
+        """
+    def minimise(self, eps: float, weight: float, iterations: int, gain: float) -> tuple[float, float]:
+        """Go on from where the last one ended, until all is valid; return the energy before and after.
+
+        It ends as well where an iteration lowers the energy by less than this share of that of the inverted simplices.
+        """
+    def points(self) -> Float64:
+        """Return the free points (free, d)."""
+    @property
+    def min_det(self) -> float:
+        """The smallest determinant of J there."""
+    @property
+    def evaluations(self) -> int:
+        """How often the energy was evaluated."""
+
+def foldover_energy(
+    simplices: Int32, points: Float64, sizes: Float64, eps: float, weight: float, free: int, threads: int
+) -> tuple[float, Float64, float]:
+    """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
 
 def min_norm_point(vectors: Float64) -> Float64:
     """Return the point of smallest norm in the convex hull of the rows."""

@@ -271,7 +271,7 @@ class Run:
     def _another_start(self) -> Iterator[NDArray[np.float64]]:
         self.rival, self.best = self.best, None
         self.fewest, self.largest = len(self.mendable), -math.inf
-        compute = partial(_embedded, self.max_move)
+        compute = partial(_embedded, self.max_move, self.threads)
         yield from self.team.of_whole(compute, self.points, self.first[0], self.near)
 
     def _mendings(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
@@ -348,15 +348,16 @@ class Run:
 
 def _embedded(
     max_move: float,
+    threads: int,
     stars: kernels.Connectivity,
     points: NDArray[np.float64],
     start: NDArray[np.float64],
     near: NDArray[np.bool_],
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the points with those near by in the graph's embedding, as far as they may go."""
-    from meshfix_cli.solve.foldover import _embedding
+    from meshfix_cli.solve.foldover import embedding
 
-    embedded = _embedding(points, stars, near)
+    embedded = embedding(points, stars, near, threads)
     way = embedded - start
     length = np.linalg.norm(way, axis=1)
     far = length > max_move

@@ -95,7 +95,7 @@ _STALLING = replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled")
 _LP_INVALID = Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True)
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
-_FOLDOVER = Phase("FF", max_sweeps=120, from_best=True, rings=(None,))
+_FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
 
 
 def _starts(rings: tuple[int, ...] = ()) -> tuple[Phase, ...]:

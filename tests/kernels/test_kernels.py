@@ -5,12 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
-from typing import Any
 
 import generate
 import numpy as np
 import pytest
-from meshes import random_star, relocate, star_of, star_rows, tangle
+from meshes import built_for, random_star, relocate, star_of, star_rows, tangle
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
@@ -219,12 +218,6 @@ def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move
         assert relocated(start, move, threads, rotate, begin) == expected
 
 
-def built_for(name: str) -> Any:
-    """Another build of the kernels; skips where this processor, or the compiler, has not what it takes."""
-    module = pytest.importorskip(f"meshfix_cli.kernels.{name}")
-    return module if name == "_any" or module.has_avx2() else pytest.skip("there is no AVX2 here")
-
-
 @pytest.mark.parametrize("move", list(Move))
 @pytest.mark.parametrize("case", ["usual", "hard", "collapsed"])
 def test_builds_for_wider_vectors_give_the_same_bits(mesh: Mesh, move: Move, case: str) -> None:
@@ -419,50 +412,3 @@ def test_the_linear_programme_gains_on_the_way_too(bracket: Mesh) -> None:
             relocate(start, Move.UNTANGLE, points, blocks, only, max_move=0.03)
         before, after = (kernels.check(p, np.ascontiguousarray(star), 1)[1] for p in (start.points, points))
         assert after >= before - 1e-15
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_gradient_of_the_foldover_free_energy(random: np.random.Generator, d: int) -> None:
-    """Against central differences, with regular and with inverted simplices, and for any threads."""
-    n, free = 40, 25
-    points = random.normal(size=(n, d))
-    simplices = np.array([random.permutation(n)[: d + 1] for _ in range(120)], dtype=np.int32)
-    sizes = random.uniform(0.5, 2.0, len(simplices))
-    energy = kernels.Foldover(simplices, n)
-
-    def value(p: NDArray[np.float64]) -> float:
-        return energy.evaluate(p, sizes, 0.4, 0.3, free, 1)[0]
-
-    total, gradient, least = energy.evaluate(points, sizes, 0.4, 0.3, free, 1)
-    jacobians = np.linalg.det(points[simplices[:, 1:]] - points[simplices[:, :1]]) / sizes**d
-    assert least == pytest.approx(jacobians.min(), rel=1e-12)
-    expected = np.zeros_like(gradient)
-    for vertex, k in np.ndindex(free, d):
-        step = np.zeros_like(points)
-        step[vertex, k] = 1e-5
-        expected[vertex, k] = (value(points + step) - value(points - step)) / 2e-5
-    np.testing.assert_allclose(gradient, expected, rtol=1e-5, atol=1e-7 * np.abs(expected).max())
-    again = energy.evaluate(points, sizes, 0.4, 0.3, free, 3)
-    assert (again[0], again[1].tobytes()) == (total, gradient.tobytes())
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_the_energy_is_that_of_the_publication(random: np.random.Generator, d: int) -> None:
-    """Written out with matrices; 1 + weight * 2 for each regular simplex of its target's size, times d."""
-    regular = np.array([[0, 0], [1, 0], [0.5, math.sqrt(0.75)]])
-    if d == 3:
-        regular = np.array(
-            [[0, 0, 0], [1, 0, 0], [0.5, math.sqrt(0.75), 0], [0.5, math.sqrt(1 / 12), math.sqrt(2 / 3)]]
-        )
-    reference = (regular[1:] - regular[0]).T
-    reference /= np.linalg.det(reference) ** (1 / d)
-    simplex = np.arange(d + 1, dtype=np.int32)[None]
-    for eps in (0.0, 0.7):
-        points = random.normal(size=(d + 1, d))
-        points = points if np.linalg.det(points[1:] - points[0]) > 0 or eps > 0 else points[:, ::-1].copy()
-        jacobian = (points[1:] - points[0]).T @ np.linalg.inv(reference) / 1.7
-        det = np.linalg.det(jacobian)
-        chi = (det + math.hypot(det, eps)) / 2
-        expected = np.trace(jacobian.T @ jacobian) / chi ** (2 / d) + 0.3 * (1 + det**2) / chi
-        actual = kernels.Foldover(simplex, d + 1).evaluate(points, np.array([1.7]), eps, 0.3, d + 1, 1)[0]
-        assert actual == pytest.approx(expected, rel=1e-12)

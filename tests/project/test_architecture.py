@@ -40,7 +40,6 @@ KERNEL_ROOMS: dict[str, set[str]] = {
 }
 OWNERS = {
     "rich": {"report/terminal"},
-    "scipy": {"solve/foldover"},
     "meshio": {"meshfile/formats", "meshfile/through_meshio"},
     "click": {"cli"},
     "distributed": {"workers/dask"},

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
@@ -73,3 +75,9 @@ def with_an_inverted_fixed_simplex(mesh: Mesh) -> Mesh:
     points = mesh.points.copy()
     points[first] = 2 * points[others].mean(axis=0) - points[first]
     return mesh.with_points(points)
+
+
+def built_for(name: str) -> Any:
+    """Another build of the kernels; skips where this processor, or the compiler, has not what it takes."""
+    module = pytest.importorskip(f"meshfix_cli.kernels.{name}")
+    return module if name == "_any" or module.has_avx2() else pytest.skip("there is no AVX2 here")

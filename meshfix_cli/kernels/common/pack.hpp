@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 namespace meshfix {
 
@@ -50,6 +51,7 @@ inline Pack operator+(Pack a, Pack b) { return lanewise([&](int i) { return a[i]
 inline Pack operator-(Pack a, Pack b) { return lanewise([&](int i) { return a[i] - b[i]; }); }
 inline Pack operator*(Pack a, Pack b) { return lanewise([&](int i) { return a[i] * b[i]; }); }
 inline Pack operator/(Pack a, Pack b) { return lanewise([&](int i) { return a[i] / b[i]; }); }
+inline Pack operator-(Pack a) { return lanewise([&](int i) { return -a[i]; }); }
 inline Pack operator-(Pack a, double b) { return lanewise([&](int i) { return a[i] - b; }); }
 inline Pack operator*(double a, Pack b) { return lanewise([&](int i) { return a * b[i]; }); }
 inline Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
@@ -81,6 +83,34 @@ inline Pack square_root(Pack p) {
     for (int i = 0; i < LANES; ++i) p[i] = std::sqrt(p[i]);
     return p;
 }
+
+// Of normal positive numbers, to the last bit or two: three steps of Halley from the exponent's third. All processors
+// and libraries give the same bits.
+inline Pack cube_root(Pack p) {
+    Pack root;
+    for (int i = 0; i < LANES; ++i) {
+        const double number = p[i];
+        std::uint64_t bits;
+        std::memcpy(&bits, &number, sizeof bits);
+        bits = bits / 3 + 0x2A9F7893782DA1CE;
+        double guess;
+        std::memcpy(&guess, &bits, sizeof guess);
+        root[i] = guess;
+    }
+    for (int step = 0; step < 3; ++step) {
+        const Pack cube = root * root * root;
+        root = root * (cube + p + p) / (cube + cube + p);
+    }
+    return root;
+}
+
+// LANES numbers that lie side by side in memory.
+inline Pack pack_at(const double* numbers) {
+    Pack p;
+    std::memcpy(&p, numbers, sizeof p);
+    return p;
+}
+inline void put(Pack p, double* numbers) { std::memcpy(numbers, &p, sizeof p); }
 
 // A sum over blocks of LANES numbers, in MOST_LANES parts.
 class LaneSum {

@@ -47,6 +47,20 @@ constexpr double CROSSING = 1e-5;
 constexpr double IN_LINE = 1e-12;  // of the largest coordinate: what facets of one line or plane may be apart
 constexpr std::size_t CROSSINGS_PER_FACET = 16;  // that are looked for; a tangled boundary has no end of them
 
+// L-BFGS.
+constexpr int LBFGS_PAIRS = 8;         // of vectors that it keeps
+constexpr int LBFGS_TRIALS = 20;       // along one direction
+constexpr double LBFGS_FARTHER = 4.0;  // times the last trial, where the minimum is beyond it
+constexpr double WOLFE_VALUE = 1e-4;   // share of the first slope by which the value must fall
+constexpr double WOLFE_SLOPE = 0.9;    // share of it that may be left
+
+// Foldover-free energy: an iteration that lowers it by less, relative, ends a minimisation.
+constexpr double FOLDOVER_EXACT = 2e-9;
+
+// Embedding: length of the residual, of that at the start.
+constexpr double EMBEDDING_EXACT = 1e-5;
+constexpr int EMBEDDING_ITERATIONS = 1000;
+
 // Minimum-norm point: relative optimality gap.
 constexpr double MIN_NORM_GAP = 1e-12;
 

@@ -54,6 +54,16 @@ inline Vec<3, T> determinant_slope(const Edges<3, T>& e) {
     return cross(e[2] - e[0], e[1] - e[0]);
 }
 
+// The gradients of the determinant by the edges.
+template <class T>
+inline Edges<2, T> determinant_slopes(const Edges<2, T>& e) {
+    return {Vec<2, T>{e[1][1], -e[1][0]}, Vec<2, T>{-e[0][1], e[0][0]}};
+}
+template <class T>
+inline Edges<3, T> determinant_slopes(const Edges<3, T>& e) {
+    return {cross(e[1], e[2]), cross(e[2], e[0]), cross(e[0], e[1])};
+}
+
 // Positions in a simplex of the face opposite corner k, ordered so that (k, face) is an even permutation:
 // det(face - x) is then the determinant of the simplex with x at corner k.
 template <int D>
@@ -74,8 +84,8 @@ inline auto is_plainly_valid(T det, T longest2) {
     return (det > constant<T>(0.0)) & (det * det > constant<T>(VALID * VALID) * measure2);
 }
 
-template <int D>
-using Corners = std::array<Vec<D>, D + 1>;
+template <int D, class T = double>
+using Corners = std::array<Vec<D, T>, D + 1>;
 
 // The edges from the corner where the determinant is most exact: its rounding error is of the size of their product.
 template <int D>

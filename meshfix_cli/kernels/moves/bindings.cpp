@@ -3,8 +3,9 @@
 
 #include "measures/python.hpp"
 #include "mesh/python.hpp"
+#include "moves/embedding.hpp"
 #include "moves/exclusive.hpp"
-#include "moves/foldover.hpp"
+#include "moves/foldover_problem.hpp"
 #include "moves/relocate.hpp"
 
 namespace meshfix {
@@ -124,35 +125,71 @@ auto min_norm_point_py(const Matrix<const double>& vectors) {
     }));
 }
 
-// Holds the connectivity of one minimisation.
-struct PyFoldover {
-    std::variant<Foldover<2>, Foldover<3>> energy;
-};
-
-void init_foldover(PyFoldover* self, const Matrix<const std::int32_t>& simplices, std::int64_t n) {
-    const auto m = static_cast<std::int64_t>(simplices.shape(0));
-    if (simplices.shape(1) == 3) {
-        new (self) PyFoldover{Foldover<2>(simplices.data(), m, n)};
-    } else {
-        new (self) PyFoldover{Foldover<3>(simplices.data(), m, n)};
-    }
+// The points, the free ones at the mean of their neighbours.
+auto embedding_py(const Matrix<const double>& points, const PyConnectivity& self, const Vector<const bool>& free,
+                  int threads) {
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    check_points(points, self);
+    const std::uint8_t* mask = bytes_of(free, self.mesh.n());
+    std::vector<double> embedded(points.data(), points.data() + points.size());
+    with_dimension(points.shape(1), [&](auto d) {
+        Embedding<d>(stars_of(self.mesh), points.data(), mask, self.mesh.n(), threads).move(embedded.data());
+        return 0;
+    });
+    return to_numpy(std::move(embedded), points.shape(1));
 }
 
-auto evaluate_py(PyFoldover& self, const Matrix<const double>& points, const Vector<const double>& sizes, double eps,
-                 double weight, std::int64_t free, int threads) {
+auto foldover_energy_py(const Matrix<const std::int32_t>& simplices, const Matrix<const double>& points,
+                        const Vector<const double>& sizes, double eps, double weight, std::int64_t free, int threads) {
     const std::size_t d = points.shape(1);
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
-    EnergyValue value;
-    {
-        const nb::gil_scoped_release release;
-        value = std::visit(
-            [&](auto& energy) {
-                return energy.evaluate(points.data(), sizes.data(), Regularisation{eps, weight}, free,
-                                       gradient.data(), threads);
-            },
-            self.energy);
-    }
+    const EnergyValue value = with_dimension(d, [&](auto dimension) {
+        Foldover<dimension> energy(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)),
+                                   static_cast<std::int64_t>(points.shape(0)));
+        return energy.evaluate(points.data(), sizes.data(), {eps, weight}, free, gradient.data(), threads);
+    });
     return std::make_tuple(value.energy, to_numpy(std::move(gradient), d), value.min_det);
+}
+
+// Minimises the energy for one eps after the other, each time from where the last one ended.
+struct PyFoldover {
+    std::variant<Lbfgs<FoldoverProblem<2>>, Lbfgs<FoldoverProblem<3>>> lbfgs;
+
+    template <class F>
+    auto with_problem(const F& f) {
+        return std::visit([&](auto& minimiser) { return f(minimiser.function()); }, lbfgs);
+    }
+};
+
+template <int D>
+PyFoldover make_foldover(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
+                         const Vector<const double>& sizes, const Matrix<const double>& centres, double radius,
+                         int threads) {
+    const FoldoverRegion<D> region{points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
+                                   sizes.data(), static_cast<std::int64_t>(simplices.shape(0)), centres.data(),
+                                   static_cast<std::int64_t>(centres.shape(0)), radius};
+    Lbfgs<FoldoverProblem<D>> lbfgs(FoldoverProblem<D>(region, threads), region.free * D, threads);
+    lbfgs.start();
+    return {std::move(lbfgs)};
+}
+
+void init_foldover(PyFoldover* self, const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
+                   const Vector<const double>& sizes, const Matrix<const double>& centres, double radius, int threads) {
+    new (self) PyFoldover(with_dimension(points.shape(1), [&](auto d) {
+        return make_foldover<d>(points, simplices, sizes, centres, radius, threads);
+    }));
+}
+
+auto minimise_py(PyFoldover& self, double eps, double weight, int iterations, double gain) {
+    const nb::gil_scoped_release release;
+    return std::visit(
+        [&](auto& lbfgs) {
+            lbfgs.function().regularisation = {eps, weight};
+            lbfgs.function().gain = gain;
+            const double before = lbfgs.start(), after = lbfgs.minimise(iterations);
+            return std::make_pair(before, after);
+        },
+        self.lbfgs);
 }
 
 }  // namespace
@@ -171,10 +208,20 @@ void bind_moves(nb::module_& m) {
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;
 
+    m.def("embedding", &embedding_py, "points"_a.noconvert(), "mesh"_a, "free"_a.noconvert(), "threads"_a);
+    m.def("foldover_energy", &foldover_energy_py, "simplices"_a.noconvert(), "points"_a.noconvert(),
+          "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a, "threads"_a);
     nb::class_<PyFoldover>(m, "Foldover")
-        .def("__init__", &init_foldover, "simplices"_a.noconvert(), "n"_a)
-        .def("evaluate", &evaluate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a,
-             "threads"_a);
+        .def("__init__", &init_foldover, "points"_a.noconvert(), "simplices"_a.noconvert(), "sizes"_a.noconvert(),
+             "centres"_a.noconvert(), "radius"_a, "threads"_a)
+        .def("minimise", &minimise_py, "eps"_a, "weight"_a, "iterations"_a, "gain"_a)
+        .def("points", [](PyFoldover& self) {
+            return self.with_problem(
+                [](auto& p) { return to_numpy(p.free_points(), static_cast<std::size_t>(p.DIMENSION)); });
+        })
+        .def_prop_ro("min_det", [](PyFoldover& self) { return self.with_problem([](auto& p) { return p.min_det(); }); })
+        .def_prop_ro("evaluations",
+                     [](PyFoldover& self) { return self.with_problem([](auto& p) { return p.evaluations(); }); });
 
     static_assert(static_cast<int>(Move::come_back) == 9, "the codes of strategies.Move");
 }

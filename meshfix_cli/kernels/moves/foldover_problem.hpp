@@ -1,0 +1,144 @@
+// The foldover-free energy as a function of the free vertices of a region, each of which may be bound to a ball.
+//
+// Its variables are the positions, in the unit of the region from its origin; where there are balls, points u of all of
+// space: the position is centre + radius u / sqrt(1 + u^2).
+#pragma once
+
+#include <vector>
+
+#include "measures/measures.hpp"
+#include "moves/foldover.hpp"
+#include "moves/lbfgs.hpp"
+
+namespace meshfix {
+
+// What a region is given as, in model units: points (n, D), the `free` ones first; simplices (m, D+1) and their sizes
+// (m); a ball for each free vertex; an infinite radius: none.
+template <int D>
+struct FoldoverRegion {
+    const double* points;
+    std::int64_t n;
+    const std::int32_t* simplices;
+    const double* sizes;
+    std::int64_t m;
+    const double* centres;
+    std::int64_t free;
+    double radius;
+};
+
+template <int D>
+class FoldoverProblem {
+ public:
+    static constexpr int DIMENSION = D;
+    Regularisation regularisation{1.0, 1.0};
+    double gain = 0.0;  // share of the energy of the inverted simplices by which an iteration must lower it, to go on
+
+    FoldoverProblem(const FoldoverRegion<D>& region, int threads)
+        : energy_(region.simplices, region.m, region.n),
+          free_(region.free),
+          threads_(threads),
+          points_(region.points, region.points + region.n * D),
+          local_(region.n * D),
+          sizes_(region.sizes, region.sizes + region.m),
+          centres_(region.centres, region.centres + region.free * D),
+          reach_(region.radius) {
+        for (double size : sizes_) unit_ += size / static_cast<double>(region.m);
+        for (double& size : sizes_) size /= unit_;
+        for (std::int64_t i = 0; i < region.n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(region.n);
+        for (std::int64_t v = 0; v < region.n; ++v) save(to_local(load<D>(points_.data() + v * D)), local_.data(), v);
+        radius_ = reach_ / unit_;
+    }
+
+    // The variables at the points of the region. Those on the rim of a ball would be infinite: they are drawn inside.
+    Numbers start() const {
+        constexpr double INSIDE = 0.99;
+        Numbers u(free_ * D);
+        for_each_free([&](std::int64_t v) {
+            Vec<D> x = load<D>(local_.data() + v * D);
+            if (bound()) {
+                x = (1.0 / radius_) * (x - centre(v));
+                const double length = std::sqrt(norm2(x)), drawn = smaller(1.0, INSIDE / larger(length, INSIDE));
+                x = drawn * x;
+                x = (1.0 / std::sqrt(1.0 - norm2(x))) * x;
+            }
+            save(x, u.data(), v);
+        });
+        return u;
+    }
+
+    double operator()(const double* u, double* gradient) {
+        for_each_free([&](std::int64_t v) { save(position(v, load<D>(u + v * D)), local_.data(), v); });
+        last_ = energy_.evaluate(local_.data(), sizes_.data(), regularisation, free_, gradient, threads_);
+        if (bound()) {
+            for_each_free([&](std::int64_t v) {
+                save(pulled_back(load<D>(u + v * D), load<D>(gradient + v * D)), gradient, v);
+            });
+        }
+        valid_ = last_.min_det > 0.0 && is_valid();
+        ++evaluations_;
+        return last_.energy;
+    }
+
+    bool enough() const { return valid_; }
+    double least_gain() const { return larger(FOLDOVER_EXACT * last_.energy, gain * last_.of_inverted); }
+    double min_det() const { return last_.min_det; }
+    std::int64_t evaluations() const { return evaluations_; }
+
+    // The free points (free, D) as they were seen last, in model units.
+    std::vector<double> free_points() {
+        place();
+        return {points_.begin(), points_.begin() + free_ * D};
+    }
+
+ private:
+    void place() {
+        for_each_free([&](std::int64_t v) {
+            Vec<D> x = load<D>(local_.data() + v * D);
+            for (int k = 0; k < D; ++k) x[k] = origin_[k] + unit_ * x[k];
+            const Vec<D> centre = load<D>(centres_.data() + v * D);
+            const bool outside = bound() && std::sqrt(norm2(x - centre)) > reach_;  // by rounding
+            save(outside ? centre : x, points_.data(), v);
+        });
+    }
+
+    template <class F>
+    void for_each_free(const F& f) const {
+        for_each_range(free_, PER_ITEM, threads_, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t v = begin; v < end; ++v) f(v);
+        });
+    }
+
+    static void save(const Vec<D>& x, double* to, std::int64_t v) { std::copy(x.begin(), x.end(), to + v * D); }
+
+    bool bound() const { return reach_ < INFINITY; }
+
+    Vec<D> to_local(const Vec<D>& x) const { return (1.0 / unit_) * (x - origin_); }
+    Vec<D> centre(std::int64_t v) const { return to_local(load<D>(centres_.data() + v * D)); }
+
+    Vec<D> position(std::int64_t v, const Vec<D>& u) const {
+        return bound() ? centre(v) + (radius_ / std::sqrt(1.0 + norm2(u))) * u : u;
+    }
+
+    // The gradient by u of a function whose gradient by the position is given.
+    Vec<D> pulled_back(const Vec<D>& u, const Vec<D>& slope) const {
+        const double square = 1.0 + norm2(u);
+        return (radius_ / std::sqrt(square)) * (slope - (dot(u, slope) / square) * u);
+    }
+
+    // By the predicate of the whole package, where the points will be stored.
+    bool is_valid() {
+        place();
+        return check<D>(points_.data(), energy_.simplices().data(), energy_.size(), threads_).inverted.empty();
+    }
+
+    Foldover<D> energy_;
+    std::int64_t free_, evaluations_ = 0;
+    int threads_;
+    std::vector<double> points_, local_, sizes_, centres_;
+    double reach_, unit_ = 0.0, radius_ = INFINITY;
+    Vec<D> origin_{};
+    EnergyValue last_;
+    bool valid_ = false;
+};
+
+}  // namespace meshfix

@@ -28,6 +28,7 @@ RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best
 RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
 RAISE_PATIENCE = 2
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
+REGION_PATIENCE = 5  # minimisations without fewer inverted elements after which a larger region is tried
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
 EASY = 3  # sweeps: a mesh that took more to untangle is smoothed up to the goal, even if nothing is below the threshold
 GOAL = {2: 1.3, 3: 1.6}  # times the threshold: up to there, where three passes of smoothing do not suffice
@@ -376,12 +377,19 @@ def _minimisations(
     broken: NDArray[np.bool_],
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
-    from meshfix_cli.solve.foldover import Reach, minimisations
+    from meshfix_cli.solve.foldover import QUICK, THOROUGH, Reach, minimisations
 
     for rings in regions:
         near = free if rings is None else free & stars.grown(broken, rings).view(bool)
         if rings is not None and 2 * near.sum() > free.sum():
             return  # as good as the whole mesh
-        for moved in minimisations(points, stars, near, Reach(start, max_move), threads):
+        efforts = (QUICK, THOROUGH) if rings is None else (QUICK,)
+        fewest, waited = len(stars.simplices), 0
+        for moved in minimisations(points, stars, near, Reach(start, max_move), threads, efforts):
             points = moved
             yield points
+            left = len(kernels.check(points, stars.simplices, threads)[0])
+            waited = 0 if left < fewest else waited + 1
+            fewest = min(fewest, left)
+            if rings is not None and waited == REGION_PATIENCE:
+                break

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+from dataclasses import replace
 from typing import Any, Literal
 
 import generate
@@ -20,8 +21,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import ceiling, displacement, summarise
 from meshfix_cli.report.as_json import history_csv
+from meshfix_cli.solve.foldover import MINIMISATIONS, QUICK, THOROUGH, Reach, minimisations
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.run import NEAR
+from meshfix_cli.solve.run import NEAR, REGION_PATIENCE
 from meshfix_cli.solve.strategies import SMOOTHING, STRATEGIES, SWEEPS, plan
 from meshfix_cli.solve.untangle import steps
 
@@ -263,6 +265,25 @@ def test_the_energy_is_minimised_in_a_region_first() -> None:
     far = np.linalg.norm(mesh.points - mesh.points[vertex], axis=1) > 0.5
     assert after.points[far].tobytes() == mesh.points[far].tobytes()
     assert (after.points != points).any(axis=1).sum() < 60
+
+
+def test_a_region_that_does_not_help_is_left() -> None:
+    """Two rings are too few for a hole that was turned that far; the whole mesh is enough."""
+    phase = replace(STRATEGIES["auto"][-2], rings=(2,))
+    records = [record for _, record in steps(turned_hole(150), [phase])]
+    left = [record.inverted for record in records if record.phase == phase.name]
+    assert len(left) < MINIMISATIONS
+    assert min(left[-REGION_PATIENCE:]) >= min(left[:-REGION_PATIENCE])
+    assert untangle(turned_hole(150)).valid
+
+
+def test_a_thorough_minimisation_solves_what_a_quick_one_does_not() -> None:
+    mesh = turned_hole(180)
+    free, points = mesh.along_curve(mesh.movable), mesh.along_curve(mesh.points)
+    for effort, solved in ((QUICK, False), (THOROUGH, True)):
+        *_, last = minimisations(points, mesh.topology.stars(), free, Reach(points), 1, (effort,))
+        assert (not len(kernels.check(last, mesh.topology.stars().simplices, 1)[0])) == solved
+    assert untangle(mesh, "FF").valid
 
 
 @pytest.mark.parametrize("strategy", ["auto", "FF"])

@@ -163,7 +163,7 @@ def plan(strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False) -> 
     if smooth == "best":
         return (*untangling, passes, _MORE, *_BEST)
     if smooth == "auto":
-        return (*untangling, replace(passes, rings=RINGS), _MORE)
+        return (*untangling, replace(passes, rings=RINGS), *(() if only_invalid else (_MORE,)))
     return (*untangling, replace(passes, max_sweeps=smooth))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.elements import counted
-from meshfix_cli.mesh.topology import Topology, build_topology, read_only
+from meshfix_cli.mesh.topology import Topology, build_topology, read_only, rows_of
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -105,7 +105,7 @@ class Mesh:
 
     def along_curve(self, values: NDArray[_T]) -> NDArray[_T]:
         """Return values (n, ...) of the points as those (k, ...) of the connectivity's vertices."""
-        return np.take(values, self.topology.connectivity.vertices, axis=0)
+        return rows_of(values, self.topology.connectivity.vertices)
 
     def check(self, threads: int = 1) -> tuple[int, float]:
         """Count the inverted simplices: those whose determinant is not positive beyond rounding.
@@ -160,12 +160,13 @@ def _checked_simplices(
 
 
 def _check_coordinates(points: NDArray[np.float64], used: NDArray[np.int32]) -> None:
-    corners = np.take(points, used, axis=0)
+    corners = points if len(used) == len(points) else np.take(points, used, axis=0)
     finite = np.isfinite(corners)
     if not finite.all():
         vertex = int(used[np.argmin(finite.all(axis=1))])
         raise InvalidMeshError(f"vertex {vertex} has a coordinate that is not finite")
-    low, high = corners.min(axis=0), corners.max(axis=0)
+    # Column by column: along the rows numpy takes ten times as long.
+    low, high = (np.array([find(column) for column in corners.T]) for find in (np.min, np.max))
     if max(-low.min(), high.max()) > LARGEST_COORDINATE:
         raise InvalidMeshError(f"coordinates beyond {LARGEST_COORDINATE:g} cannot be computed with")
     if (high - low).max() < SMALLEST_SIZE:

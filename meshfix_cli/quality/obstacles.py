@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import SIMPLICES
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.topology import distinct
 
 Array = NDArray[np.float64]
 
@@ -93,11 +94,11 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         simplices = owners[pairs]
         parts = connectivity.component[simplices]
         within = (parts[:, 0] == parts[:, 1]) & (simplices[:, 0] != simplices[:, 1])
-        return np.unique(np.sort(rows[simplices[within]], axis=1), axis=0)
+        return _distinct_pairs(rows[simplices[within]])
 
     return Obstacles(
         np.sort(rows[inverted[free == 0]]),
-        np.unique(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
+        distinct(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
         in_one_part(kernels.crossings(points, facets, threads)),
         in_one_part(kernels.folds(points, facets, shared, threads)),
         np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
@@ -112,7 +113,14 @@ def _exclusive(
         return inverted
     stars = mesh.topology.stars(threads)
     corners = stars.simplices[inverted]
-    return kernels.exclusive(points, stars, movable, np.unique(corners[movable[corners]]), threads)
+    return kernels.exclusive(points, stars, movable, distinct(corners[movable[corners]]), threads)
+
+
+def _distinct_pairs(pairs: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the different pairs (c, 2), each and all of them ascending."""
+    first, second = np.sort(pairs, axis=1).astype(np.int64).T
+    found = distinct(first << 32 | second)
+    return np.stack([found >> 32, found & 0xFFFFFFFF], axis=1).astype(np.int32)
 
 
 def _overlapping(

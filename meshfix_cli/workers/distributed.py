@@ -304,7 +304,7 @@ class Ranks:
         self.messages, self.bytes = 0, 0
         connectivity = kernels.Connectivity.part(part.simplices, len(part.vertices), threads)
         m = len(part.simplices)
-        topology = Topology(len(part.vertices), np.arange(m), np.zeros(m, dtype=bool), connectivity)
+        topology = Topology(len(part.vertices), np.arange(m, dtype=np.int32), np.zeros(m, dtype=bool), connectivity)
         self.mesh = Mesh(part.points, topology, part.movable)
         self.stars = topology.stars(threads)
         self.own_vertices = np.arange(len(part.vertices)) < part.own

@@ -22,11 +22,22 @@ typedef double Pack __attribute__((vector_size(LANES * sizeof(double))));
 typedef std::int64_t PackMask __attribute__((vector_size(LANES * sizeof(double))));
 
 inline Pack select(PackMask mask, Pack a, Pack b) { return mask ? a : b; }
+inline bool any(PackMask mask) {
+    std::int64_t either = mask[0];
+    for (int i = 1; i < LANES; ++i) either |= mask[i];
+    return either != 0;
+}
+inline bool all(PackMask mask) {
+    std::int64_t both = mask[0];
+    for (int i = 1; i < LANES; ++i) both &= mask[i];
+    return both != 0;
+}
 
 #else
 
 struct PackMask {
     bool lane[LANES];
+    bool operator[](int i) const { return lane[i]; }
 };
 
 struct Pack {
@@ -58,10 +69,39 @@ inline Pack& operator+=(Pack& a, Pack b) { return a = a + b; }
 inline PackMask operator>(Pack a, Pack b) { return masked([&](int i) { return a[i] > b[i]; }); }
 inline PackMask operator<(Pack a, Pack b) { return masked([&](int i) { return a[i] < b[i]; }); }
 inline PackMask operator>(Pack a, double b) { return masked([&](int i) { return a[i] > b; }); }
+inline PackMask operator>=(Pack a, Pack b) { return masked([&](int i) { return a[i] >= b[i]; }); }
 inline PackMask operator&(PackMask a, PackMask b) { return masked([&](int i) { return a.lane[i] && b.lane[i]; }); }
 inline Pack select(PackMask m, Pack a, Pack b) { return lanewise([&](int i) { return m.lane[i] ? a[i] : b[i]; }); }
+inline bool any(PackMask mask) {
+    bool either = false;
+    for (bool here : mask.lane) either |= here;
+    return either;
+}
+inline bool all(PackMask mask) {
+    bool both = true;
+    for (bool here : mask.lane) both &= here;
+    return both;
+}
 
 #endif
+
+// f(0), f(1), ... side by side.
+template <class F>
+inline Pack gathered(const F& f) {
+#if defined(__GNUC__) && defined(__AVX2__)
+    return Pack{f(0), f(1), f(2), f(3)};
+#elif defined(__GNUC__)
+    return Pack{f(0), f(1)};
+#else
+    return lanewise(f);
+#endif
+}
+
+inline Pack load_pack(const double* from) {
+    Pack p;
+    std::memcpy(&p, from, sizeof p);
+    return p;
+}
 
 inline Pack broadcast(double x, const Pack*) {
     Pack p;

@@ -130,6 +130,15 @@ inline void store_relaxed(std::uint8_t& byte, std::uint8_t value) {
 #endif
 }
 
+// Says that something will be read soon.
+inline void prefetch(const void* p) {
+#if defined(__GNUC__)
+    __builtin_prefetch(p);
+#else
+    static_cast<void>(p);
+#endif
+}
+
 // Things that each thread needs one of at a time, kept for the next that comes as long as this lives.
 template <class T>
 class Spares {

@@ -18,13 +18,14 @@ class SmallMap {
         if (++round_ == 0) slots_.assign(slots_.size(), Slot{}), round_ = 1;
     }
 
-    // The value of a key; where it is new, `value` with is_new = true.
-    Value& find(std::uint64_t key, Value value, bool& is_new) {
+    // The value of a key; where it is new, is_new = true, and the value is anything.
+    Value& find(std::uint64_t key, bool& is_new) {
         // What is around one vertex has numbers that are near each other: their last digits tell them apart.
         std::size_t at = static_cast<std::size_t>(key ^ key >> 29) & mask_;
         while (slots_[at].round == round_ && slots_[at].key != key) at = (at + 1) & mask_;
         is_new = slots_[at].round != round_;
-        if (is_new) slots_[at] = {key, round_, value};
+        slots_[at].key = key;
+        slots_[at].round = round_;
         return slots_[at].value;
     }
 

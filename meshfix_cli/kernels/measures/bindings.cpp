@@ -14,7 +14,8 @@ auto summarise_py(const Matrix<const double>& points, const PyConnectivity& self
                             threads);
     });
     return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.histogram)), total.sum,
-                           to_numpy(std::move(total.inverted)), total.folded, total.min_measure, total.largest);
+                           to_numpy(std::move(total.validity.inverted)), total.folded, total.validity.min_measure,
+                           total.largest);
 }
 
 auto check_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
@@ -55,7 +56,7 @@ auto angles_py(const Matrix<const double>& points, const Matrix<const std::int32
         constexpr int D = dimension;
         for_each_range(static_cast<std::int64_t>(m), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
             for_each_angles<D>(points.data(), simplices.data(), begin, end,
-                               [&](std::int64_t s, const Edges<D>&, AngleRange range) {
+                               [&](std::int64_t s, AngleRange range) {
                                    smallest[s] = range.smallest;
                                    largest[s] = range.largest;
                                });

@@ -50,6 +50,10 @@ void flip_py(PyConnectivity& self, const Vector<const bool>& flipped, int thread
     with_dimension(self.dimension, [&](auto d) { flip<d>(self.mesh, mask, threads); });
 }
 
+auto signed_sizes_py(const PyConnectivity& self, const Matrix<const double>& points) {
+    return to_numpy(with_dimension(self.dimension, [&](auto d) { return signed_sizes<d>(self.mesh, points.data()); }));
+}
+
 void build_stars_py(PyConnectivity& self, int threads) {
     with_dimension(self.dimension, [&](auto d) {  // the interpreter lock is released first: nobody waits for both
         const std::lock_guard<std::mutex> lock(self.building);
@@ -128,20 +132,24 @@ auto used_vertices_py(const Matrix<const std::int32_t>& simplices, std::int64_t 
 
 auto check_simplices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
     const auto m = static_cast<std::int64_t>(simplices.shape(0));
-    const auto columns = static_cast<std::int64_t>(simplices.shape(1));
     struct Bad {
         std::int64_t outside = -1, repeated = -1;
     };
     std::vector<Bad> parts(m / PER_ITEM + 1);
-    for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        for (std::int64_t s = end; s-- > begin;) {
-            const std::int32_t* row = simplices.data() + s * columns;
-            for (std::int64_t i = 0; i < columns; ++i) {
-                if (row[i] < 0 || row[i] >= n) parts[item].outside = s;
-                for (std::int64_t j = 0; j < i; ++j)
-                    if (row[i] == row[j]) parts[item].repeated = s;
+    with_dimension(simplices.shape(1) - 1, [&](auto dimension) {
+        constexpr std::int64_t corners = dimension + 1;
+        for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+            for (std::int64_t s = end; s-- > begin;) {
+                const std::int32_t* row = simplices.data() + s * corners;
+                bool outside = false, repeated = false;
+                for (std::int64_t i = 0; i < corners; ++i) {
+                    outside |= (row[i] < 0) | (row[i] >= n);
+                    for (std::int64_t j = 0; j < i; ++j) repeated |= row[i] == row[j];
+                }
+                if (outside) parts[item].outside = s;
+                if (repeated) parts[item].repeated = s;
             }
-        }
+        });
     });
     Bad first;
     for (const auto& part : parts) {
@@ -183,6 +191,18 @@ auto enclosing_py(const Matrix<const double>& points, const Matrix<const std::in
     return to_numpy(std::move(found));
 }
 
+// Rows of an array.
+auto rows_py(const Matrix<const double>& values, const Vector<const std::int32_t>& which) {
+    const std::size_t count = which.shape(0), columns = values.shape(1);
+    std::vector<double> rows(count * columns);
+    with_dimension(columns, [&](auto dimension) {
+        constexpr int D = dimension;
+        for (std::size_t i = 0; i < count; ++i)
+            for (int k = 0; k < D; ++k) rows[i * D + k] = values.data()[static_cast<std::int64_t>(which(i)) * D + k];
+    });
+    return to_numpy(std::move(rows), columns);
+}
+
 // Where two arrays of points differ.
 auto moved_py(const Matrix<const double>& before, const Matrix<const double>& after, int threads) {
     if (before.size() != after.size()) throw nb::value_error("the points are of two meshes");
@@ -200,6 +220,7 @@ auto moved_py(const Matrix<const double>& before, const Matrix<const double>& af
 void bind_mesh(nb::module_& m) {
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
+    m.def("rows", &rows_py, "values"_a.noconvert(), "which"_a.noconvert());
     m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert(), "threads"_a);
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
     m.def("folds", &folds_py, "points"_a.noconvert(), "facets"_a.noconvert(), "shared"_a.noconvert(), "threads"_a);
@@ -214,6 +235,7 @@ void bind_mesh(nb::module_& m) {
         .def("__setstate__", &restore)
         .def_static("part", &part_py, "simplices"_a.noconvert(), "n"_a, "threads"_a)
         .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
+        .def("signed_sizes", &signed_sizes_py, "points"_a.noconvert())
         .def("build_stars", &build_stars_py, "threads"_a)
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
         .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)

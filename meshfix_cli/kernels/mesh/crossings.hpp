@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -47,32 +46,39 @@ template <int D>
 class Crossings {
    public:
     Crossings(const double* points, const std::int32_t* facets, std::int64_t count, int threads)
-        : points_(points), facets_(facets), order_(count), leaves_(count) {
-        std::iota(order_.begin(), order_.end(), 0);
+        : points_(points), facets_(facets), order_(count) {
         if (count == 0) return;
         std::size_t nodes = 1;
         for (std::int64_t size = count; size > LEAF; size = (size + 1) / 2) nodes = 2 * nodes + 1;
         boxes_.resize(nodes);
-        split(0, 0, count, 0);
-        for_each_item(static_cast<std::int64_t>(parts_.size()), threads, [&](std::int64_t i) {
-            build(parts_[i].node, parts_[i].begin, parts_[i].end);
-        });
+        for (int k = 0; k < D; ++k) {
+            low_[k].resize(count + LANES);
+            high_[k].resize(count + LANES);
+        }
+        std::vector<Item> items(count);
+        for (std::int32_t i = 0; i < count; ++i) items[i] = {vertex(i, 0), i};
+        split(items, {0, 0, count}, 0);
+        for_each_item(static_cast<std::int64_t>(parts_.size()), threads, [&](std::int64_t i) { build(items, parts_[i]); });
         for (auto node = above_.rbegin(); node != above_.rend(); ++node) join(*node);
     }
 
     std::vector<std::int32_t> find(int threads) const {
-        return find(threads, [&](std::int32_t a, std::int32_t b) { return cross(a, b); });
+        return find(threads, [&](std::int32_t a, std::int32_t b) { return cross(corners_of(a), corners_of(b)); });
     }
 
     // Pairs of facets (a, b) whose boxes meet and for which `holds(a, b)`.
     template <class Holds>
     std::vector<std::int32_t> find(int threads, const Holds& holds) const {
-        std::vector<std::vector<std::int32_t>> found(order_.size() / FACETS_PER_ITEM + 1);
-        for_each_item(static_cast<std::int64_t>(found.size()), threads, [&](std::int64_t item) {
-            const auto count = static_cast<std::int64_t>(order_.size());
-            for (std::int64_t i = item * FACETS_PER_ITEM; i < std::min(count, (item + 1) * FACETS_PER_ITEM); ++i)
-                search(0, 0, count, static_cast<std::int32_t>(i), box_of(static_cast<std::int32_t>(i)),
-                       found[item].size() + 2 * CROSSINGS_PER_FACET, holds, found[item]);
+        std::vector<std::vector<std::int32_t>> found(parts_.size());
+        for_each_item(static_cast<std::int64_t>(parts_.size()), threads, [&](std::int64_t item) {
+            std::vector<Part> near;
+            std::vector<std::int32_t> pairs;
+            for_each_leaf(parts_[item], [&](const Part& leaf) {
+                near.clear();
+                find_leaves({0, 0, static_cast<std::int64_t>(order_.size())}, boxes_[leaf.node], near);
+                for (std::int64_t i = leaf.begin; i < leaf.end; ++i) search(near, i, holds, pairs);
+            });
+            found[item] = std::move(pairs);
         });
         std::vector<std::int32_t> pairs;
         for (const auto& part : found) pairs.insert(pairs.end(), part.begin(), part.end());
@@ -100,6 +106,12 @@ class Crossings {
     struct Part {
         std::size_t node;
         std::int64_t begin, end;
+    };
+
+    // A facet and its first vertex.
+    struct Item {
+        Vec<D> at;
+        std::int32_t facet;
     };
 
     struct Box {
@@ -164,7 +176,7 @@ class Crossings {
             return;
         }
         for (std::int64_t i = begin; i < end; ++i) {
-            const int turn = ray_meets(leaves_[i], place) ? turn_at(order_[i], place) : 0;
+            const int turn = ray_meets(box_at(i), place) ? turn_at(order_[i], place) : 0;
             if (turn == 0) continue;
             const std::int32_t part = parts[order_[i]];
             const auto known = std::find_if(turns.begin(), turns.end(), [&](const auto& one) { return one.first == part; });
@@ -176,7 +188,7 @@ class Crossings {
         }
     }
 
-    static constexpr std::int64_t LEAF = 8, FACETS_PER_ITEM = 1024;
+    static constexpr std::int64_t LEAF = 8;
     static constexpr int PARTS_AT = 5;  // depth in the tree
 
     Box box_of(std::int32_t facet) const {
@@ -185,29 +197,53 @@ class Crossings {
         return box;
     }
 
-    // Cuts down to parts that are built by themselves.
-    void split(std::size_t node, std::int64_t begin, std::int64_t end, int depth) {
-        if (depth == PARTS_AT || end - begin <= LEAF) {
-            parts_.push_back({node, begin, end});
-            return;
+    // That of a facet by its place in the order.
+    Box box_at(std::int64_t i) const {
+        Box box;
+        for (int k = 0; k < D; ++k) {
+            box.low[k] = low_[k][i];
+            box.high[k] = high_[k][i];
         }
-        above_.push_back(node);
-        const std::int64_t middle = halve(begin, end);
-        split(2 * node + 1, begin, middle, depth + 1);
-        split(2 * node + 2, middle, end, depth + 1);
+        return box;
     }
 
-    void build(std::size_t node, std::int64_t begin, std::int64_t end) {
-        if (end - begin <= LEAF) {
-            for (std::int64_t i = begin; i < end; ++i) leaves_[i] = box_of(order_[i]);
-            boxes_[node] = leaves_[begin];
-            for (std::int64_t i = begin + 1; i < end; ++i) boxes_[node].add(leaves_[i]);
+    // Which of the facets at LANES places from one on have boxes that meet another.
+    PackMask meet_at(std::int64_t i, const Box& box) const {
+        PackMask meet = constant<Pack>(box.high[0]) >= load_pack(&low_[0][i]);
+        for (int k = 0; k < D; ++k) {
+            meet = meet & (constant<Pack>(box.high[k]) >= load_pack(&low_[k][i]));
+            meet = meet & (load_pack(&high_[k][i]) >= constant<Pack>(box.low[k]));
+        }
+        return meet;
+    }
+
+    // Cuts down to parts that are built by themselves.
+    void split(std::vector<Item>& items, const Part& part, int depth) {
+        if (depth == PARTS_AT || part.end - part.begin <= LEAF) return parts_.push_back(part);
+        above_.push_back(part.node);
+        halve(items, part);
+        split(items, first_half(part), depth + 1);
+        split(items, second_half(part), depth + 1);
+    }
+
+    void build(std::vector<Item>& items, const Part& part) {
+        if (part.end - part.begin <= LEAF) {
+            for (std::int64_t i = part.begin; i < part.end; ++i) {
+                order_[i] = items[i].facet;
+                const Box box = box_of(order_[i]);
+                for (int k = 0; k < D; ++k) {
+                    low_[k][i] = box.low[k];
+                    high_[k][i] = box.high[k];
+                }
+            }
+            boxes_[part.node] = box_at(part.begin);
+            for (std::int64_t i = part.begin + 1; i < part.end; ++i) boxes_[part.node].add(box_at(i));
             return;
         }
-        const std::int64_t middle = halve(begin, end);
-        build(2 * node + 1, begin, middle);
-        build(2 * node + 2, middle, end);
-        join(node);
+        halve(items, part);
+        build(items, first_half(part));
+        build(items, second_half(part));
+        join(part.node);
     }
 
     void join(std::size_t node) {
@@ -215,62 +251,111 @@ class Crossings {
         boxes_[node].add(boxes_[2 * node + 2]);
     }
 
-    // In two halves along the longest side of the box of the first vertices.
-    std::int64_t halve(std::int64_t begin, std::int64_t end) {
-        Box box{vertex(order_[begin], 0), vertex(order_[begin], 0)};
-        for (std::int64_t i = begin; i < end; ++i) box.add(vertex(order_[i], 0));
+    // Puts them in two halves along the longest side of the box of their first vertices.
+    void halve(std::vector<Item>& items, const Part& part) {
+        Box box{items[part.begin].at, items[part.begin].at};
+        for (std::int64_t i = part.begin; i < part.end; ++i) box.add(items[i].at);
         int axis = 0;
         for (int c = 1; c < D; ++c)
             if (box.high[c] - box.low[c] > box.high[axis] - box.low[axis]) axis = c;
-        const std::int64_t middle = (begin + end) / 2;
-        std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
-                         [&](std::int32_t a, std::int32_t b) {
-                             const double p = vertex(a, 0)[axis], q = vertex(b, 0)[axis];
-                             return p != q ? p < q : a < b;
+        const auto first = items.begin();
+        std::nth_element(first + part.begin, first + first_half(part).end, first + part.end,
+                         [axis](const Item& a, const Item& b) {
+                             return a.at[axis] != b.at[axis] ? a.at[axis] < b.at[axis] : a.facet < b.facet;
                          });
-        return middle;
     }
 
-    // Appends pairs until there are `full` numbers.
+    template <class F>
+    void for_each_leaf(const Part& part, const F& f) const {
+        if (part.end - part.begin <= LEAF) return f(part);
+        for_each_leaf(first_half(part), f);
+        for_each_leaf(second_half(part), f);
+    }
+
+    // Appends the leaves whose boxes meet another.
+    void find_leaves(const Part& part, const Box& box, std::vector<Part>& leaves) const {
+        if (!boxes_[part.node].meets(box)) return;
+        if (part.end - part.begin <= LEAF) return leaves.push_back(part);
+        find_leaves(first_half(part), box, leaves);
+        find_leaves(second_half(part), box, leaves);
+    }
+
+    static Part first_half(const Part& part) { return {2 * part.node + 1, part.begin, (part.begin + part.end) / 2}; }
+    static Part second_half(const Part& part) { return {2 * part.node + 2, (part.begin + part.end) / 2, part.end}; }
+
+    // Appends the first pairs of a facet, by its place in the order, with those behind it by number that lie in some leaves.
     template <class Holds>
-    void search(std::size_t node, std::int64_t begin, std::int64_t end, std::int32_t facet, const Box& box,
-                std::size_t full, const Holds& holds, std::vector<std::int32_t>& found) const {
-        if (found.size() >= full || !boxes_[node].meets(box)) return;
-        if (end - begin > LEAF) {
-            const std::int64_t middle = (begin + end) / 2;
-            search(2 * node + 1, begin, middle, facet, box, full, holds, found);
-            search(2 * node + 2, middle, end, facet, box, full, holds, found);
-            return;
+    void search(const std::vector<Part>& near, std::int64_t at, const Holds& holds, std::vector<std::int32_t>& found) const {
+        const std::int32_t facet = order_[at];
+        const Box box = box_at(at);
+        const std::size_t full = found.size() + 2 * CROSSINGS_PER_FACET;
+        for (const Part& leaf : near) {
+            if (found.size() >= full) return;
+            if (!boxes_[leaf.node].meets(box)) continue;
+            for (std::int64_t i = leaf.begin; i < leaf.end; i += LANES) {
+                const PackMask meet = meet_at(i, box);
+                if (!any(meet)) continue;
+                for (int lane = 0; lane < std::min<std::int64_t>(LANES, leaf.end - i); ++lane)
+                    if (meet[lane] && order_[i + lane] > facet && holds(facet, order_[i + lane]))
+                        found.insert(found.end(), {facet, order_[i + lane]});
+            }
         }
-        for (std::int64_t i = begin; i < end; ++i)
-            if (order_[i] > facet && leaves_[i].meets(box) && holds(facet, order_[i]))
-                found.insert(found.end(), {facet, order_[i]});
     }
 
-    bool shares(std::int32_t facet, std::int32_t v) const {
-        const std::int32_t* f = facets_ + static_cast<std::int64_t>(facet) * D;
-        return std::find(f, f + D, v) != f + D;
+    struct Facet {
+        std::array<std::int32_t, D> vertices;
+        std::array<Vec<D>, D> at;
+
+        bool has(std::int32_t v) const {
+            bool found = vertices[0] == v;
+            for (int k = 1; k < D; ++k) found |= vertices[k] == v;
+            return found;
+        }
+    };
+
+    Facet corners_of(std::int32_t facet) const {
+        Facet corners;
+        for (int k = 0; k < D; ++k) {
+            corners.vertices[k] = facets_[static_cast<std::int64_t>(facet) * D + k];
+            corners.at[k] = vertex(facet, k);
+        }
+        return corners;
     }
 
-    bool cross(std::int32_t a, std::int32_t b) const {
+    static bool cross(const Facet& a, const Facet& b) {
+        int shared = 0;
+        for (int k = 0; k < D; ++k) shared += b.has(a.vertices[k]);
         if constexpr (D == 2) {
-            if (shares(b, facets_[a * 2]) || shares(b, facets_[a * 2 + 1])) return false;
-            return cross_each_other(vertex(a, 0), vertex(a, 1), vertex(b, 0), vertex(b, 1));
+            return shared == 0 && cross_each_other(a.at[0], a.at[1], b.at[0], b.at[1]);
         } else {
-            int shared = 0;
-            for (int k = 0; k < 3; ++k) shared += shares(b, facets_[a * 3 + k]);
-            return shared < 2 && (any_edge_pierces(a, b) || any_edge_pierces(b, a));
+            if (shared > 1) return false;
+            const Sides first = sides(a, b);
+            return !first.one && (any_edge_pierces(a, first, b) || any_edge_pierces(b, sides(b, a), a));
         }
     }
 
-    bool any_edge_pierces(std::int32_t a, std::int32_t b) const {
-        const std::array<Vec<3>, 3> triangle{vertex(b, 0), vertex(b, 1), vertex(b, 2)};
-        std::array<int, 3> sides;  // 0 for a vertex that the two share: its edges do not cross
-        for (int k = 0; k < 3; ++k)
-            sides[k] = shares(b, facets_[a * 3 + k]) ? 0 : side<3>({vertex(a, k), triangle[0], triangle[1], triangle[2]});
+    // On which sides of a triangle the vertices of another are, 0 for one that they share: its edges do not cross.
+    struct Sides {
+        std::array<int, 3> of{};
+        bool one = true;  // all but that one are on one side beyond doubt
+    };
+
+    static Sides sides(const Facet& a, const Facet& b) {
+        Sides result;
+        int known = 0;
+        for (int k = 0; k < 3; ++k) {
+            if (b.has(a.vertices[k])) continue;
+            result.of[k] = side<3>({a.at[k], b.at[0], b.at[1], b.at[2]});
+            result.one &= result.of[k] != 0 && known * result.of[k] >= 0;
+            known = result.of[k];
+        }
+        return result;
+    }
+
+    static bool any_edge_pierces(const Facet& a, const Sides& sides, const Facet& b) {
         for (int k = 0; k < 3; ++k) {
             const int next = (k + 1) % 3;
-            if (sides[k] * sides[next] < 0 && pierces(vertex(a, k), vertex(a, next), triangle)) return true;
+            if (sides.of[k] * sides.of[next] < 0 && pierces(a.at[k], a.at[next], b.at)) return true;
         }
         return false;
     }
@@ -280,7 +365,8 @@ class Crossings {
     std::vector<std::int32_t> order_;
     std::vector<Part> parts_;         // of the tree, and the nodes above them, each before its children
     std::vector<std::size_t> above_;
-    std::vector<Box> leaves_, boxes_;  // of the facets in `order_`, of the nodes
+    std::array<std::vector<double>, D> low_, high_;  // of the boxes of the facets in `order_`, and LANES numbers more
+    std::vector<Box> boxes_;                         // of the nodes
 };
 
 }  // namespace meshfix

@@ -80,17 +80,15 @@ template <class F>
 void for_each_facet_at(const std::int32_t* simplex, int here, std::integral_constant<int, 3>, const F& f) {
     const auto& face = opposite_face<3>(here);
     const std::array<std::int32_t, 3> u{simplex[face[0]], simplex[face[1]], simplex[face[2]]};
-    const std::array<bool, 3> above{u[0] > simplex[here], u[1] > simplex[here], u[2] > simplex[here]};
+    const std::array<int, 3> above{u[0] > simplex[here], u[1] > simplex[here], u[2] > simplex[here]};
     const auto add = [&](int k) {
         const std::int32_t x = u[(k + 1) % 3], y = u[(k + 2) % 3];
         f(static_cast<std::uint64_t>(std::min(x, y)) << 32 | static_cast<std::uint64_t>(std::max(x, y)), face[k], x > y);
     };
     const int count = above[0] + above[1] + above[2];
-    if (count == 3) {
-        for (int k = 0; k < 3; ++k) add(k);
-    } else if (count == 2) {
-        add(!above[0] ? 0 : !above[1] ? 1 : 2);
-    }
+    if (count < 2) return;
+    if (count == 2) return add(2 - 2 * !above[0] - !above[1]);
+    for (int k = 0; k < 3; ++k) add(k);
 }
 
 // Each facet is matched at its smallest vertex.
@@ -104,10 +102,10 @@ Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Inciden
     const auto n = static_cast<std::int64_t>(csr.offsets.size()) - 1;
     Facets facets;
     facets.mates.assign(m * (D + 1), -1);
-    facets.against.assign(m * (D + 1), 0);
+    facets.against.resize(m * (D + 1));
     std::vector<std::int64_t> crowded(n / VERTICES + 1, -1);
     for_each_range(n, VERTICES, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        thread_local SmallMap<Seen> at_vertex;
+        SmallMap<Seen> at_vertex;
         for (std::int64_t v = begin; v < end; ++v) {
             at_vertex.clear(static_cast<std::size_t>(D) * (csr.offsets[v + 1] - csr.offsets[v]));
             for (std::int32_t i = csr.offsets[v]; i < csr.offsets[v + 1]; ++i) {
@@ -117,8 +115,11 @@ Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Inciden
                                   [&](std::uint64_t key, int position, bool odd) {
                     const std::int32_t corner = first + position;
                     bool is_new = false;
-                    Seen& other = at_vertex.find(key, {corner, odd}, is_new);
-                    if (is_new) return;
+                    Seen& other = at_vertex.find(key, is_new);
+                    if (is_new) {
+                        other = {corner, odd};
+                        return;
+                    }
                     if (other.corner < 0 || simplices[other.corner] == simplices[corner]) {
                         crowded[item] = corner;
                         return;
@@ -253,29 +254,36 @@ class Union {
     std::vector<std::uint8_t> against_;
 };
 
-// Each item joins the simplices inside a range; what joins ranges comes last.
+// Each item joins the simplices of a range to those before them in it, of which none has to climb far; what joins ranges
+// comes last.
 template <int D>
 Orientation orient(const Facets& facets, std::int64_t m, int threads) {
     constexpr std::int64_t RANGE = 65536;
     Union sets(m);
     std::atomic<bool> orientable{true};
-    std::vector<std::vector<std::int32_t>> later(m / RANGE + 1);  // corners whose mates are in another range
-    const auto& mates = facets.mates;
+    std::vector<std::vector<std::int32_t>> later(m / RANGE + 1);  // corners whose mates are in a range before
+    const std::int32_t* const mates = facets.mates.data();
     const auto join = [&](std::int32_t corner) {
-        if (!sets.join(corner / (D + 1), mates[corner] / (D + 1), facets.against[corner] != 0)) orientable = false;
+        return sets.join(corner / (D + 1), mates[corner] / (D + 1), facets.against[corner] != 0);
     };
     for_each_range(m, RANGE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        for (auto c = static_cast<std::int32_t>(begin * (D + 1)); c < end * (D + 1); ++c) {
-            if (mates[c] < c) continue;
-            if (mates[c] < end * (D + 1)) {
-                join(c);
-            } else {
-                later[item].push_back(c);
+        const auto start = static_cast<std::int32_t>(begin * (D + 1));
+        bool agree = true;
+        for (auto s = static_cast<std::int32_t>(begin); s < end; ++s) {
+            std::array<std::int32_t, D + 2> before;  // corners with mates before them, in the range
+            int count = 0;
+            for (std::int32_t c = s * (D + 1); c <= s * (D + 1) + D; ++c) {
+                before[count] = c;
+                count += (mates[c] >= start) & (mates[c] < c);
+                if (mates[c] < start && mates[c] >= 0) later[item].push_back(c);
             }
+            for (int i = 0; i < count; ++i) agree &= join(before[i]);
         }
+        if (!agree) orientable = false;
     });
     for (const auto& corners : later)
-        for (std::int32_t c : corners) join(c);
+        for (std::int32_t c : corners)
+            if (!join(c)) orientable = false;
     Orientation result = std::move(sets).result();
     result.orientable = orientable;
     return result;

@@ -187,9 +187,12 @@ Order order_mesh(const double* points, std::int64_t n, const std::int32_t* simpl
     for (std::int64_t s = 0; s < m; ++s) order.rows[next[first[s]]++] = static_cast<std::int32_t>(s);
     order.simplices.resize(m * (D + 1));
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-        for (std::int64_t s = begin; s < end; ++s)
-            for (int k = 0; k <= D; ++k)
-                order.simplices[s * (D + 1) + k] = number[simplices[static_cast<std::int64_t>(order.rows[s]) * (D + 1) + k]];
+        constexpr std::int64_t AHEAD = 16;  // the rows are all over the file
+        const auto row = [&](std::int64_t s) { return simplices + static_cast<std::int64_t>(order.rows[s]) * (D + 1); };
+        for (std::int64_t s = begin; s < end; ++s) {
+            if (s + AHEAD < end) prefetch(row(s + AHEAD));
+            for (int k = 0; k <= D; ++k) order.simplices[s * (D + 1) + k] = number[row(s)[k]];
+        }
     });
     return order;
 }

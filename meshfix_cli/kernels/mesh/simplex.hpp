@@ -118,14 +118,20 @@ inline bool is_barely_valid(const Corners<D>& p, double unit) {
     return determinant(e) > VALID * error;
 }
 
+// Whether the edges from one vertex tell that a simplex is valid: the others are at most twice as long.
+template <int D, class T>
+inline auto is_valid_at_a_glance(const Edges<D, T>& e, T det) {
+    T longest2 = norm2(e[0]);
+    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
+    return is_plainly_valid<D>(det, constant<T>(4.0) * longest2);
+}
+
 // The one validity predicate, for a star in its local frame and for the whole mesh. False for NaN. `corners` gives the
-// corners, where the edges from one do not tell: the other edges are at most twice as long.
+// corners, where the edges from one do not tell.
 template <int D, class F>
 inline bool is_valid(const Edges<D>& e, double det, const F& corners, double unit = 0.0) {
-    double longest2 = norm2(e[0]);
-    for (int k = 1; k < D; ++k) longest2 = larger(longest2, norm2(e[k]));
-    if (is_plainly_valid<D>(det, 4.0 * longest2)) return true;
-    return !is_plainly_valid<D>(-det, 4.0 * longest2) && is_barely_valid<D>(corners(), unit);
+    if (is_valid_at_a_glance<D>(e, det)) return true;
+    return !is_valid_at_a_glance<D>(e, -det) && is_barely_valid<D>(corners(), unit);
 }
 
 }  // namespace meshfix

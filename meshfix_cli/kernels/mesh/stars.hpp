@@ -82,6 +82,33 @@ Connectivity part_of_mesh(const std::int32_t* simplices, std::int64_t m, std::in
     return part;
 }
 
+// Signed sizes, times d!, of the components as their simplices are numbered together: those of the boundary facets seen
+// from one of its vertices. Where inner vertices are does not matter: one that is far away would drown a sum over the
+// simplices in rounding. points (n, D) in the user's order
+template <int D>
+std::vector<double> signed_sizes(const Connectivity& mesh, const double* points) {
+    const auto at = [&](std::int32_t v) { return load<D>(points + static_cast<std::int64_t>(mesh.vertices[v]) * D); };
+    std::vector<double> sizes;
+    std::vector<Vec<D>> origins;
+    std::vector<bool> known;
+    for (std::size_t corner = 0; corner < mesh.mates.size(); ++corner) {
+        const std::size_t s = corner / (D + 1), component = static_cast<std::size_t>(mesh.component[s]);
+        if (component >= sizes.size()) {
+            sizes.resize(component + 1, 0.0);
+            origins.resize(component + 1);
+            known.resize(component + 1, false);
+        }
+        if (mesh.mates[corner] >= 0) continue;
+        const auto& face = opposite_face<D>(static_cast<int>(corner % (D + 1)));
+        if (!known[component]) origins[component] = at(mesh.simplices[s * (D + 1) + face[0]]);
+        known[component] = true;
+        Edges<D> e;
+        for (int k = 0; k < D; ++k) e[k] = at(mesh.simplices[s * (D + 1) + face[k]]) - origins[component];
+        sizes[component] += mesh.against[s] ? -determinant(e) : determinant(e);
+    }
+    return sizes;
+}
+
 // Exchanges the first two vertices of some simplices: the other orientation. Before the stars are built.
 template <int D>
 void flip(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
@@ -104,31 +131,42 @@ void flip(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
     });
 }
 
-// The neighbours and faces of the vertices of a block; `place` (n) is where a vertex may be in `neighbours`: it is there
-// if it is found there.
+// Where each vertex (n) stands among the neighbours that were found last: less than `next` was before, it does not.
+struct Places {
+    std::vector<std::uint32_t> of_vertex;
+    std::uint32_t next = 1;
+};
+
+// The neighbours and faces of the vertices of a block.
 template <int D>
-void find_neighbours(Connectivity& mesh, std::int64_t begin, std::int64_t end, std::vector<std::uint32_t>& place,
+void find_neighbours(Connectivity& mesh, std::int64_t begin, std::int64_t end, Places& places,
                      std::vector<std::int32_t>& neighbours) {
+    std::uint32_t* const place = places.of_vertex.data();
+    std::uint16_t* face_out = mesh.faces.data() + static_cast<std::size_t>(mesh.offsets[begin]) * D;
+    std::vector<std::int32_t> row;
     for (std::int64_t v = begin; v < end; ++v) {
-        const std::size_t row = neighbours.size();
+        const std::int64_t corners = mesh.offsets[v + 1] - mesh.offsets[v];
+        if (static_cast<std::int64_t>(row.size()) < corners * D) row.resize(corners * D);
+        const std::uint32_t first = places.next;
+        std::uint32_t next = first;
         for (std::int32_t i = mesh.offsets[v]; i < mesh.offsets[v + 1]; ++i) {
             const std::int32_t here = mesh.corners[i] % (D + 1);
             const std::int32_t* simplex = &mesh.simplices[mesh.corners[i] - here];
-            const auto& face = opposite_face<D>(here);
-            for (int k = 0; k < D; ++k) {
-                const std::int32_t u = simplex[face[k]];
-                std::size_t at = place[u];
-                if (at < row || at >= neighbours.size() || neighbours[at] != u) {
-                    at = neighbours.size();
-                    place[u] = static_cast<std::uint32_t>(at);
-                    neighbours.push_back(u);
+            for (const int position : opposite_face<D>(here)) {
+                const std::int32_t u = simplex[position];
+                std::uint32_t at = place[u];
+                if (at < first) {
+                    at = place[u] = next++;
+                    row[at - first] = u;
                 }
-                mesh.faces[static_cast<std::size_t>(i) * D + k] = static_cast<std::uint16_t>(at - row);
+                *face_out++ = static_cast<std::uint16_t>(at - first);
             }
         }
-        if (neighbours.size() - row > std::numeric_limits<std::uint16_t>::max())
+        if (next - first > std::numeric_limits<std::uint16_t>::max())
             throw std::length_error("a vertex has more than 65,535 neighbours");
-        mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(neighbours.size() - row);
+        neighbours.insert(neighbours.end(), row.begin(), row.begin() + (next - first));
+        mesh.neighbour_offsets[v + 1] = static_cast<std::int32_t>(next - first);
+        places.next = next;
     }
 }
 
@@ -137,11 +175,14 @@ void build_neighbours(Connectivity& mesh, int threads) {
     mesh.faces.resize(mesh.corners.size() * D);
     mesh.neighbour_offsets.assign(mesh.n() + 1, 0);
     std::vector<std::vector<std::int32_t>> found(mesh.blocks());
-    Spares<std::vector<std::uint32_t>> places;
+    Spares<Places> spares;
     for_each_range(mesh.n(), BLOCK_SIZE, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t block) {
-        places.with([&](std::vector<std::uint32_t>& place) {
-            place.resize(mesh.n());
-            find_neighbours<D>(mesh, begin, end, place, found[block]);
+        spares.with([&](Places& places) {
+            if (places.of_vertex.empty() || places.next > std::numeric_limits<std::int32_t>::max()) {
+                places.of_vertex.assign(mesh.n(), 0);
+                places.next = 1;
+            }
+            find_neighbours<D>(mesh, begin, end, places, found[block]);
         });
     });
     std::int64_t total = 0;

@@ -33,5 +33,6 @@ def first_of_each_place(points: NDArray[np.float64], rows: NDArray[np.integer]) 
 def count(first: Int64) -> tuple[int, int]:
     """Return how many points share a place with others, and how many such places there are."""
     copies = first != np.arange(len(first))
-    places = len(np.unique(first[copies]))
-    return int(copies.sum()) + places, places
+    places = np.zeros(len(first), dtype=bool)
+    places[first[copies]] = True
+    return int(copies.sum() + places.sum()), int(places.sum())

@@ -14,7 +14,7 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError
 from meshfix_cli.mesh.elements import Element, counted, dimension_of, solved_among
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
-from meshfix_cli.mesh.topology import Topology
+from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
@@ -82,12 +82,13 @@ class Document:
         moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & mesh.topology.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
-                points[moved] = mesh.points[moved]
+                np.copyto(points, mesh.points, casting="same_kind", where=moved[:, None])
             elif np.isin(self.basis, (0.0, 1.0)).all():
                 points[np.ix_(moved, self.basis.argmax(axis=1))] = mesh.points[moved]
             else:
                 points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
-        points[moved] = self.source.rounded(points[moved])
+        if not self.source.exact:
+            points[moved] = self.source.rounded(points[moved])
         if self.copies is not None:
             behind = np.flatnonzero(moved[self.copies] & ~mesh.topology.used)
             points[behind] = points[self.copies[behind]]
@@ -99,8 +100,8 @@ class Document:
 
     def in_plane(self, points: NDArray[np.float64], mesh: Mesh) -> Mesh:
         """Return a moved mesh at points (n, 2 or 3) in the coordinates of the file."""
-        used = points[mesh.topology.used]
-        if not (np.abs(used) <= LARGEST_COORDINATE).all():
+        large = ~(np.abs(points) <= LARGEST_COORDINATE)
+        if large.any() and large[mesh.topology.used].any():
             raise InvalidMeshError("the coordinates are too large for the numbers of the file")
         return mesh.with_points(np.ascontiguousarray(points if self.basis is None else _flat(points, self.basis)))
 
@@ -160,7 +161,8 @@ def build(
     starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
     chosen = _runs_of(source, element)
     simplices = _simplices(source, element)
-    ids = np.concatenate([_ids(source.cells[i], int(starts[i])) for i in chosen])
+    parts = [_ids(source.cells[i], int(starts[i])) for i in chosen]
+    ids = parts[0] if len(parts) == 1 else np.concatenate(parts)
 
     points, basis = _solved_points(source, simplices, dimension)
     copies = _copies(points, simplices) if join_points else None
@@ -195,7 +197,8 @@ def build(
     notes = (*source.notes, *_notes(mesh, len(simplices), seen_from_above, copies))
     fixed = {reason: count for reason, count in fixed.items() if count}
     left = _not_judged(source, element)
-    return Document(name, mesh, form, ids[topology.source], fixed, left, notes, source, basis, copies)
+    ids = ids if topology.m == len(ids) else ids[topology.source]
+    return Document(name, mesh, form, ids, fixed, left, notes, source, basis, copies)
 
 
 def with_reversed(source: Source, rows: Mapping[int, NDArray[np.int64]]) -> Source:
@@ -286,7 +289,7 @@ def _solved_points(
     flat = np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
     if simplices.min() < 0 or simplices.max() >= len(points):
         return flat, None  # Mesh.build tells what is wrong, here and below
-    used = points[np.unique(simplices)]
+    used = points[distinct(simplices)]
     if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
         return flat, None
     basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))

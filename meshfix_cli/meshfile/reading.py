@@ -146,10 +146,11 @@ def _read_bytes(path: Path | None) -> bytes:
     """Read a file, or stdin."""
     try:
         with nullcontext(sys.stdin.buffer) if path is None else path.open("rb") as stream:
-            data = stream.read(formats.HEAD)
-            if _is_device(stream) and formats.sniff(data) is None:  # /dev/zero has no end
-                raise ReadError("is a device, and no mesh comes from it" if data else "is empty")
-            data += stream.read()
+            head = stream.read(formats.HEAD) if _is_device(stream) else b""
+            if _is_device(stream) and formats.sniff(head) is None:  # /dev/zero has no end
+                raise ReadError("is a device, and no mesh comes from it" if head else "is empty")
+            data = stream.read()
+            data = head + data if head else data  # which would be a copy
     except OSError as error:
         raise ReadError(error.strerror or str(error)) from error
     if not data:

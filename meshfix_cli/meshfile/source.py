@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.meshfile.formats import Format
-from meshfix_cli.meshfile.splice import Points
+from meshfix_cli.meshfile.splice import InPlace, Points
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
 REGIONS = (
@@ -217,10 +217,16 @@ class Source:
         layout = self.pieces or self.layout
         return points if layout is None else layout.rounded(points)
 
+    @property
+    def exact(self) -> bool:
+        """Whether the file is known to hold points of the type of these as they are."""
+        layout = self.pieces or self.layout
+        return layout is None or (isinstance(layout, InPlace) and layout.coordinates.holds(self.points.dtype))
+
     def vertices_of(self, kind: str, corners: int) -> NDArray[np.int64]:
         """Return the vertices (k, corners) of all cells of a type, in the order of the file."""
         runs = [run.vertices for run in self.cells if run.type == kind]
-        return np.concatenate(runs or [np.empty((0, corners), dtype=np.int64)])
+        return runs[0] if len(runs) == 1 else np.concatenate(runs or [np.empty((0, corners), dtype=np.int64)])
 
     def merged(self) -> Source:
         """Return the same with one run for all cells of a type: some programs read no more than one of each."""

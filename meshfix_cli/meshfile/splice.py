@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.text import Spans, numbers_at
 
 Points = NDArray[np.floating[Any]]
+SLAB = 65536  # points whose coordinates are written at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +89,13 @@ class Places:
         windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
         return windows[self.begin].view(self.dtype)[..., 0].astype(native)
 
+    def holds(self, kind: np.dtype[Any]) -> bool:
+        """Whether all numbers of a type are held as they are."""
+        return not self.longest and self.dtype.newbyteorder("=") == kind
+
     def rounded(self, values: Points) -> Points:
         """Return numbers (n, k) as the file can hold them."""
-        values = values.astype(self.dtype.newbyteorder("="))
+        values = values.astype(self.dtype.newbyteorder("="), copy=False)
         if self.longest:
             words, spans = self._encode(values.ravel())
             values = numbers_at(words, spans, self.dtype).reshape(values.shape)
@@ -98,7 +103,7 @@ class Places:
 
     def replace(self, which: NDArray[np.bool_], values: Points) -> Edits:
         """Write numbers (n, k) where `which` (n, k) is True."""
-        return Edits(np.ascontiguousarray(self.spans[which]), *self._encode(values[which]))
+        return Edits(self.at(which).spans, *self._encode(values[which]))
 
     def exchange(self, data: bytes, rows: NDArray[np.integer[Any]]) -> Edits:
         """Exchange the first two numbers of some rows."""
@@ -110,7 +115,7 @@ class Places:
     def _encode(self, values: Points) -> tuple[bytes, Spans]:
         if self.end is None:
             return values.astype(self.dtype).tobytes(), pairs(np.arange(len(values) + 1) * self.dtype.itemsize)
-        return kernels.shortest(values.astype(np.float64), self.dtype.itemsize == 4, self.longest)
+        return kernels.shortest(values.astype(np.float64, copy=False), self.dtype.itemsize == 4, self.longest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,9 +154,21 @@ class InPlace:
         reversed_cells : mapping
             Rows of cells by the number of their run.
         """
-        changed = self.coordinates.replace(differing(original, points), points)
+        changed = self._changes(original, points, slice(None))
         swaps = (self.corners[run]().exchange(self.data, rows) for run, rows in reversed_cells.items())
         return apply(self.data, [changed, *swaps])
+
+    def moved(self, original: Points, points: Points) -> Iterable[bytes | memoryview]:
+        """Give the file with other points (n, d) in parts: never is much of it in memory once more."""
+        first = self.coordinates.begin.ravel()
+        if not (first[1:] > first[:-1]).all():
+            return [self.rewritten(original, points, {})]
+        slabs = range(0, len(points), SLAB)
+        return spliced(self.data, (self._changes(original, points, slice(at, at + SLAB)) for at in slabs))
+
+    def _changes(self, original: Points, points: Points, rows: slice) -> Edits:
+        which = differing(original[rows], points[rows])
+        return self.coordinates.at(rows).replace(which, points[rows])
 
 
 def differing(original: Points, points: Points) -> NDArray[np.bool_]:
@@ -161,13 +178,27 @@ def differing(original: Points, points: Points) -> NDArray[np.bool_]:
 
 def apply(data: bytes, edits: Sequence[Edits]) -> bytes:
     """Return the data with all edits made; they may come in any order."""
-    if len(edits) == 1 and (np.diff(edits[0].spans[:, 0]) >= 0).all():  # as most files have it
-        return kernels.replace(data, edits[0].spans, edits[0].words, edits[0].word_spans)
     starts = np.cumsum([0, *(len(edit.words) for edit in edits)])
     spans = np.concatenate([edit.spans for edit in edits])
-    word_spans = np.concatenate([edit.word_spans + start for edit, start in zip(edits, starts, strict=False)])
-    order = np.argsort(spans[:, 0], kind="stable")
-    return kernels.replace(data, spans[order], b"".join(edit.words for edit in edits), word_spans[order])
+    words = np.concatenate([edit.word_spans + start for edit, start in zip(edits, starts, strict=False)])
+    if (np.diff(spans[:, 0]) < 0).any():
+        order = np.argsort(spans[:, 0], kind="stable")
+        spans, words = spans[order], words[order]
+    return b"".join(spliced(data, [Edits(spans, b"".join(edit.words for edit in edits), words)]))
+
+
+def spliced(data: bytes, edits: Iterable[Edits]) -> Iterator[bytes | memoryview]:
+    """Give the data with edits made, in parts; the edits are in the order of the data."""
+    at = 0
+    for edit in edits:
+        if len(edit.spans):
+            if at == 0:
+                at = max(int(edit.spans[0, 0]), 0)
+                yield memoryview(data)[:at]
+            end = int(edit.spans[-1, 1])
+            yield kernels.replace(data, at, end, edit.spans, edit.words, edit.word_spans)
+            at = end
+    yield memoryview(data)[at:]
 
 
 def pairs(offsets: NDArray[np.int64]) -> Spans:

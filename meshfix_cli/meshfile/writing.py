@@ -96,7 +96,11 @@ def write(
 
 def _splice(layout: Layout, original: Points, points: Points, put: Put | None, path: Path) -> None:
     if put is None or not (isinstance(layout, InPlace) and layout.binary):
-        path.write_bytes(layout.rewritten(original, points, {}))
+        if isinstance(layout, InPlace):
+            with path.open("wb") as out:
+                out.writelines(layout.moved(original, points))
+        else:
+            path.write_bytes(layout.rewritten(original, points, {}))
         return
     path.write_bytes(layout.data)
     put(path, layout.coordinates, points, differing(original, points))

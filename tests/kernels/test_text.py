@@ -186,5 +186,10 @@ def test_long_texts_are_written_in_pieces(threads: int, random: np.random.Genera
     data = b"(x) " * len(values)
     at = 4 * np.arange(len(values)) + 1
     expected = b"".join(b"(" + text[a:b] + b") " for a, b in spans.tolist())
-    assert kernels.replace(data, np.stack([at, at + 1], axis=1), text, spans) == expected
-    assert kernels.replace(b"abc", np.empty((0, 2), dtype=np.int64), b"", np.empty((0, 2), dtype=np.int64)) == b"abc"
+    places = np.stack([at, at + 1], axis=1)
+    assert kernels.replace(data, 0, len(data), places, text, spans) == expected
+    begin, end = int(at[0]), int(at[-1]) + 1
+    assert kernels.replace(data, begin, end, places, text, spans) == expected[1:-2]
+    assert (
+        kernels.replace(b"abc", 0, 3, np.empty((0, 2), dtype=np.int64), b"", np.empty((0, 2), dtype=np.int64)) == b"abc"
+    )

@@ -6,6 +6,7 @@ files.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from splicing import FORMATS, MODULES, WORD, make, repaired, without_points
 
 from meshfix_cli import read, write
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile import reading
+from meshfix_cli.meshfile import reading, splice
 from meshfix_cli.meshfile.formats import Format, sniff
 
 TABLE = [(name, variant) for name, module in MODULES.items() for variant in module.FILES]
@@ -146,3 +147,28 @@ def test_samples(name: str, tmp_path: Path) -> None:
     assert WORD.split(before)[::2] == WORD.split(after)[::2]
     changed = sum(a != b for a, b in zip(WORD.split(before)[1::2], WORD.split(after)[1::2], strict=True))
     assert changed == (points != document.source.points).sum()
+
+
+@pytest.mark.parametrize("slab", [1, 3, 10**6])
+@pytest.mark.parametrize("backwards", [False, True])
+def test_parts_that_are_written_one_by_one_make_the_whole(
+    slab: int, backwards: bool, random: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(splice, "SLAB", slab)
+    original = random.random((50, 3))
+    lines = [f"<{' '.join(map(repr, row))}>".encode() for row in original.tolist()]
+    data = b"head" + b"".join(lines) + b"tail"
+    spans = splice.pairs(np.cumsum([4, *map(len, lines)]))
+    words = np.array(
+        [
+            [[m.start() + begin, m.end() + begin] for m in re.finditer(rb"[\d.e-]+", data[begin:end])]
+            for begin, end in spans.tolist()
+        ]
+    )
+    order = np.arange(50)[::-1] if backwards else np.arange(50)
+    layout = splice.InPlace(data, splice.Places.of_text(words[order]), [])
+    for share in (0.0, 0.1, 1.0):
+        points = np.where(random.random((50, 3)) < share, random.random((50, 3)), original)
+        expected = b"head" + b"".join(f"<{' '.join(map(repr, row))}>".encode() for row in points.tolist()) + b"tail"
+        assert b"".join(layout.moved(original[order], points[order])) == expected
+        assert layout.rewritten(original[order], points[order], {}) == expected

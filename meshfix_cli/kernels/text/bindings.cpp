@@ -81,35 +81,43 @@ auto shortest_py(const Vector<const double>& values, bool single, int longest) {
     std::vector<std::string> parts(count / PER_ITEM + 1);
     std::vector<std::int64_t> spans(2 * count);
     for_each_range(count, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        std::string& part = parts[item];
         for (std::int64_t i = begin; i < end; ++i) {
-            spans[2 * i] = static_cast<std::int64_t>(parts[item].size());
-            parts[item] += single ? shortest(static_cast<float>(values(i)), longest) : shortest(values(i), longest);
-            spans[2 * i + 1] = static_cast<std::int64_t>(parts[item].size());
+            spans[2 * i] = static_cast<std::int64_t>(part.size());
+            if (single) {
+                append_shortest(part, static_cast<float>(values(i)), longest);
+            } else {
+                append_shortest(part, values(i), longest);
+            }
+            spans[2 * i + 1] = static_cast<std::int64_t>(part.size());
         }
     });
-    std::string words;
+    std::int64_t size = 0;
     for (std::size_t item = 0; item < parts.size(); ++item) {
         const std::int64_t end = std::min<std::int64_t>(count, (item + 1) * PER_ITEM);
-        for (std::int64_t i = 2 * item * PER_ITEM; i < 2 * end; ++i) spans[i] += static_cast<std::int64_t>(words.size());
-        words += parts[item];
+        for (std::int64_t i = 2 * item * PER_ITEM; i < 2 * end; ++i) spans[i] += size;
+        size += static_cast<std::int64_t>(parts[item].size());
     }
-    return std::make_pair(nb::bytes(words.data(), words.size()), to_numpy(std::move(spans), 2));
+    auto words = nb::steal<nb::bytes>(PyBytes_FromStringAndSize(nullptr, static_cast<Py_ssize_t>(size)));
+    if (!words.is_valid()) nb::raise_python_error();
+    char* to = PyBytes_AsString(words.ptr());
+    for (const auto& part : parts) to = std::copy(part.begin(), part.end(), to);
+    return std::make_pair(words, to_numpy(std::move(spans), 2));
 }
 
-// A span that is not in the text counts as empty, and so where it is put.
-nb::bytes replace_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, const nb::bytes& words,
-                     const Matrix<const std::int64_t>& word_spans) {
+// The text between two offsets. A span that is not in it counts as empty, and so where it is put.
+nb::bytes replace_py(const nb::bytes& data, std::int64_t first, std::int64_t last, const Matrix<const std::int64_t>& spans,
+                     const nb::bytes& words, const Matrix<const std::int64_t>& word_spans) {
     const std::string_view text = view_of(data), replacements = view_of(words);
     const auto count = static_cast<std::int64_t>(spans.shape(0));
     const auto word = [&](std::int64_t i) { return word_at(replacements, word_spans.data() + 2 * i); };
     const auto before = [&](std::int64_t i) {  // what stays in front of span i; of `count`, what is left
-        const std::int64_t kept[2] = {i > 0 ? spans(i - 1, 1) : 0,
-                                      i < count ? spans(i, 0) : static_cast<std::int64_t>(text.size())};
+        const std::int64_t kept[2] = {i > 0 ? spans(i - 1, 1) : first, i < count ? spans(i, 0) : last};
         return word_at(text, kept);
     };
     std::vector<std::int64_t> starts(count / PER_ITEM + 2, 0);  // where in the result each item begins
     for (std::int64_t i = 0; i < count; ++i) {
-        if (spans(i, 0) < (i > 0 ? spans(i - 1, 1) : 0)) throw nb::value_error("the spans overlap or are not in order");
+        if (spans(i, 0) < (i > 0 ? spans(i - 1, 1) : first)) throw nb::value_error("the spans overlap or are not in order");
         starts[i / PER_ITEM + 1] += static_cast<std::int64_t>(before(i).size() + word(i).size());
     }
     starts.back() += static_cast<std::int64_t>(before(count).size());
@@ -139,7 +147,7 @@ void bind_text(nb::module_& m) {
     m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert(), "slash"_a);
     m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
     m.def("shortest", &shortest_py, "values"_a.noconvert(), "single"_a, "longest"_a);
-    m.def("replace", &replace_py, "data"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());
+    m.def("replace", &replace_py, "data"_a, "first"_a, "last"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());
 }
 
 }  // namespace meshfix

@@ -125,11 +125,38 @@ inline bool read_integer(std::string_view word, std::int64_t& value, bool slash)
     return error == std::errc() && (end == word.data() + word.size() || (slash && *end == '/'));
 }
 
+// Reads an integer of at most seven digits, of which none is looked at by itself: how many they are has no order that a
+// processor could foresee. Returns how many they are; 0: it is something else, or near the end.
+inline int read_few_digits(const char* p, const char* end, std::int64_t& value) {
+#if defined(__GNUC__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+    if (end - p < 8) return 0;
+    std::uint64_t bytes;
+    std::memcpy(&bytes, p, sizeof bytes);
+    bytes ^= 0x3030303030303030;  // digits are 0 to 9 now, and nothing else is
+    const std::uint64_t others = (bytes | (bytes + 0x7676767676767676)) & 0x8080808080808080;
+    if (others == 0 || (others & 0x80) != 0) return 0;
+    const int digits = __builtin_ctzll(others) / 8;
+    bytes <<= 64 - 8 * digits;           // zeros in front of them
+    bytes = bytes * 10 + (bytes >> 8);  // pairs of digits, then pairs of pairs
+    constexpr std::uint64_t PAIRS = 0x000000FF000000FF;
+    value = static_cast<std::int64_t>(((bytes & PAIRS) * 0x000F424000000064 + (bytes >> 16 & PAIRS) * 0x0000271000000001) >> 32);
+    return digits;
+#else
+    static_cast<void>(p), static_cast<void>(end), static_cast<void>(value);
+    return 0;
+#endif
+}
+
 // Finds the next word and reads it, if it is a plain integer of at most 18 digits, in one pass; false: it is none, and
 // `at` stays.
 inline bool read_plain_integer(std::string_view text, std::int64_t& at, std::int64_t& value) {
     const char *p = text.data() + at, *const end = text.data() + text.size();
     while (p < end && separates(*p)) ++p;
+    const int few = read_few_digits(p, end, value);
+    if (few > 0 && separates(p[few])) {
+        at = p + few - text.data();
+        return true;
+    }
     const bool minus = p < end && *p == '-';
     p += minus;
     const char* const digits = p;
@@ -227,24 +254,26 @@ std::string with_digits(Real value, int digits) {
     return {buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof buffer, "%.*g", digits, double(value)))};
 }
 
-// The shortest text that reads back to the value; where that is longer than `longest` (0: no limit), the most digits
-// that fit.
+// Appends the shortest text that reads back to the value; where that is longer than `longest` (0: no limit), the most
+// digits that fit.
 template <class Real>
-std::string shortest(Real value, int longest) {
-    std::string text;
+void append_shortest(std::string& text, Real value, int longest) {
+    const std::size_t begin = text.size();
 #if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
     char buffer[64];
-    text.assign(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
+    text.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
 #else
     Real back{};
     for (int digits = 1; digits <= 17; ++digits) {
-        text = with_digits(value, digits);
-        if (read_number_slowly(text, back) && back == value) break;
+        text.resize(begin);
+        text += with_digits(value, digits);
+        if (read_number_slowly(std::string_view(text).substr(begin), back) && back == value) break;
     }
 #endif
-    for (int digits = 17; longest > 0 && static_cast<int>(text.size()) > longest && digits > 0; --digits)
-        text = with_digits(value, digits);
-    return text;
+    for (int digits = 17; longest > 0 && static_cast<int>(text.size() - begin) > longest && digits > 0; --digits) {
+        text.resize(begin);
+        text += with_digits(value, digits);
+    }
 }
 
 }  // namespace meshfix

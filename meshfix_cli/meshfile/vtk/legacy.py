@@ -5,7 +5,7 @@ Source: "VTK File Formats", section Simple Legacy Formats; what that leaves open
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache, partial
 from typing import Any, NamedTuple
@@ -39,12 +39,13 @@ def parse(data: bytes) -> Source | None:
     if points.kind not in ("f4", "f8"):
         return None
     pairs = [(table, run) for table in _tables(found) for run in runs(table.types, table.offsets, table.vertices)]
-    coordinates = points.places(np.arange(points.size).reshape(-1, 3))
-    layout = InPlace(data, coordinates, [partial(table.places, run) for table, run in pairs])
-    load = cache(partial(_arrays, found, points.tuples, [table.first + run.rows for table, run in pairs]))
+    layout = InPlace(data, points.rows(), [table.places(run) for table, run in pairs])
+    rows = [table.first + run.rows if table.first else run.rows for table, run in pairs]
+    load = cache(partial(_arrays, found, points.tuples, rows))
     named = {array.name for array in found.arrays[b"cell_data"]}
     damaged = "is not a readable vtk file: its cell data {} cannot be read"
-    regions, cells = markings(named, [_cells(table, run) for table, run in pairs], lambda: load().cell, damaged)
+    found_cells = [_cells(*pair, here) for pair, here in zip(pairs, rows, strict=True)]
+    regions, cells = markings(named, found_cells, lambda: load().cell, damaged)
     held = ghost_vertices(cells, points.tuples)
     untold = dict.fromkeys(["field data"] * bool(found.arrays[b"dataset"]) + found.untold)
     return Source(points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold))
@@ -74,10 +75,19 @@ class _Table(NamedTuple):
     numbers: Array
     gap: int
 
-    def places(self, run: Run) -> Places:
-        """Where the vertices of a run stand."""
-        before = self.offsets[run.rows] + self.gap * (run.rows + 1)
-        return self.numbers.places(before[:, None] + np.arange(run.vertices.shape[1]))
+    def places(self, run: Run) -> Callable[[], Places]:
+        """Return what tells where the vertices of a run stand, and keeps none of the large arrays where it is whole."""
+        (count, size), rows = run.vertices.shape, run.rows
+        if count and rows[-1] - rows[0] == count - 1:
+            first, step = int(self.offsets[rows[0]] + self.gap * (rows[0] + 1)), size + self.gap
+            return partial(_places, self.numbers, lambda: first + step * np.arange(count), size)
+        before = self.offsets[rows] + self.gap * (rows + 1)
+        return partial(_places, self.numbers, lambda: before, size)
+
+
+def _places(numbers: Array, first: Callable[[], NDArray[np.int64]], size: int) -> Places:
+    """Where the vertices of cells stand, from the first of each on."""
+    return numbers.places(first()[:, None] + np.arange(size))
 
 
 def _tables(found: Sections) -> list[_Table]:
@@ -159,10 +169,10 @@ def _types(sizes: NDArray[np.int64], other: int, known: dict[int, int]) -> NDArr
     return types
 
 
-def _cells(table: _Table, run: Run) -> Cells:
+def _cells(table: _Table, run: Run, ids: NDArray[np.int64]) -> Cells:
     polyhedra = len(run.rows) and table.types[run.rows[0]] == _POLYHEDRON
     vertices = [_of_polyhedron(faces) for faces in run.vertices] if polyhedra else run.vertices
-    return Cells(run.type, vertices, table.first + run.rows)
+    return Cells(run.type, vertices, ids)
 
 
 def _of_polyhedron(faces: NDArray[np.int64]) -> NDArray[np.int64]:

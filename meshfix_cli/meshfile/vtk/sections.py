@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, NamedTuple
 from urllib.parse import unquote_to_bytes
 
@@ -18,7 +19,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import REGIONS
 from meshfix_cli.meshfile.splice import Places
-from meshfix_cli.meshfile.text import behind_words, numbers_at, short_integers, words
+from meshfix_cli.meshfile.text import Spans, behind_words, numbers_at, short_integers, words
 
 _HEAD = re.compile(
     rb"(?:\xef\xbb\xbf)?\s*# vtk DataFile Version\s+(\d{1,9})[^\n]*\n[^\n]*\n\s*(ascii|binary)\s+dataset\s+(\w+)\s",
@@ -74,6 +75,14 @@ class Array:
         """How many numbers it has."""
         return self.tuples * self.components
 
+    def rows(self) -> Places:
+        """Return where its numbers (tuples, components) stand."""
+        if not self.binary:
+            return Places.of_text(self._spans.reshape(self.tuples, self.components, 2), self.kind)
+        dtype = np.dtype(f">{self.kind}")
+        first = self.begin + self.components * dtype.itemsize * np.arange(self.tuples)
+        return Places.of_rows(first, self.components, dtype.str)
+
     def values(self) -> NDArray[Any]:
         """Return the numbers (tuples,), or (tuples, components) where there are several; Odd where there are none."""
         flat = self._binary() if self.binary else self._text()
@@ -82,7 +91,7 @@ class Array:
     def places(self, which: NDArray[np.int64]) -> Places:
         """Return where the numbers `which` (m, k) stand."""
         if not self.binary:
-            return Places.of_text(words(self.data, self.begin, self.size)[which], self.kind)
+            return Places.of_text(self._spans[which], self.kind)
         dtype = np.dtype(f">{self.kind}")
         return Places(self.begin + dtype.itemsize * which, None, dtype)
 
@@ -95,12 +104,16 @@ class Array:
     def _text(self) -> NDArray[Any]:
         dtype = self._dtype()
         if dtype.kind == "f":
-            return numbers_at(self.data, words(self.data, self.begin, self.size), dtype)
+            return numbers_at(self.data, self._spans, dtype)
         read, _ = short_integers(self.data, self.begin, self.size)
         values = read.astype(dtype, copy=False)
         if (values != read).any():
             raise Odd(f"has numbers in its array {self.name!r} that are too large for their type")
         return values
+
+    @cached_property
+    def _spans(self) -> Spans:
+        return words(self.data, self.begin, self.size)
 
     def _dtype(self) -> np.dtype[Any]:
         if self.kind in ("string", "variant"):

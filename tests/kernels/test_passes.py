@@ -62,5 +62,5 @@ def test_rows_and_distinct_values_are_those_of_numpy(random: np.random.Generator
     which = random.integers(0, 50, 200).astype(np.int32)
     for values in (random.random((50, 3)), random.random((50, 2)), random.random((50, 3)).T.copy().T, which < 9):
         assert rows_of(values, which % len(values)).tobytes() == np.take(values, which % len(values), axis=0).tobytes()
-    for values in (which, which.reshape(-1, 4), which[:0]):
-        assert distinct(values).tolist() == np.unique(values).tolist()
+    for numbers in (which, which.reshape(-1, 4), which[:0]):
+        assert distinct(numbers).tolist() == np.unique(numbers).tolist()

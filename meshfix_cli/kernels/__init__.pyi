@@ -198,6 +198,19 @@ def foldover_energy(
 ) -> tuple[float, Float64, float]:
     """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
 
+def shape_energy(
+    points: Float64, simplices: Int32, free: int, goal: float, floor: float, weight: float, threads: int
+) -> tuple[float, Float64]:
+    """Energy of moves/shape.hpp and its gradient (free, d), in a unit that makes the mesh n^(1/d) in radius."""
+
+def shaped(
+    points: Float64, simplices: Int32, free: int, goal: float, floor: float, weight: float, iterations: int, threads: int
+) -> Float64:
+    """Return the first `free` points (free, d) of a valid mesh where so many iterations of L-BFGS end.
+
+    The goal and the floor are angles in degrees; `weight` is that of an element below them.
+    """
+
 def min_norm_point(vectors: Float64) -> Float64:
     """Return the point of smallest norm in the convex hull of the rows."""
 

@@ -41,6 +41,10 @@ constexpr int ASCENT_TRIALS = 6;
 // Of the way back: smaller shares are not worth a step, and would have no end.
 constexpr double LEAST_SHARE = 0.01;
 
+// Shape of all elements at once: what a mean ratio of one and a degree are worth, and the gain an element, in the mean,
+// below which an iteration is the last; the floor counts so many times the goal.
+constexpr double SHAPE_RATIO = 100.0, SHAPE_ANGLE = 0.3, SHAPE_GAIN = 1e-3, SHAPE_FLOOR = 30.0;
+
 // Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:
 // files of six digits, or in single precision, make facets that only touch interpenetrate by less.
 constexpr double CROSSING = 1e-5;

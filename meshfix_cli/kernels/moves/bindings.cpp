@@ -7,6 +7,7 @@
 #include "moves/exclusive.hpp"
 #include "moves/foldover_problem.hpp"
 #include "moves/relocate.hpp"
+#include "moves/shape.hpp"
 
 namespace meshfix {
 
@@ -151,6 +152,38 @@ auto foldover_energy_py(const Matrix<const std::int32_t>& simplices, const Matri
     return std::make_tuple(value.energy, to_numpy(std::move(gradient), d), value.min_det);
 }
 
+template <int D>
+Shape<D> make_shape(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
+                    std::int64_t free, double goal, double floor, double weight, int threads) {
+    return {points.data(), static_cast<std::int64_t>(points.shape(0)), free, simplices.data(),
+            static_cast<std::int64_t>(simplices.shape(0)), {goal, floor, weight}, threads};
+}
+
+auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
+                     std::int64_t free, double goal, double floor, double weight, int threads) {
+    const std::size_t d = points.shape(1);
+    std::vector<double> gradient(static_cast<std::size_t>(free) * d);
+    const double value = with_dimension(d, [&](auto dimension) {
+        auto shape = make_shape<dimension>(points, simplices, free, goal, floor, weight, threads);
+        const Numbers x = shape.start();
+        return shape(x.data(), gradient.data());
+    });
+    return std::make_tuple(value, to_numpy(std::move(gradient), d));
+}
+
+// The free points where so many iterations end.
+auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, std::int64_t free,
+               double goal, double floor, double weight, int iterations, int threads) {
+    const std::size_t d = points.shape(1);
+    return to_numpy(with_dimension(d, [&](auto dimension) {
+        Lbfgs<Shape<dimension>> lbfgs(make_shape<dimension>(points, simplices, free, goal, floor, weight, threads), free * dimension,
+                              threads);
+        lbfgs.start();
+        lbfgs.minimise(iterations);
+        return lbfgs.function().free_points(lbfgs.x());
+    }), d);
+}
+
 // Minimises the energy for one eps after the other, each time from where the last one ended.
 struct PyFoldover {
     std::variant<Lbfgs<FoldoverProblem<2>>, Lbfgs<FoldoverProblem<3>>> lbfgs;
@@ -205,6 +238,10 @@ void bind_moves(nb::module_& m) {
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("mean_angle", &mean_angle_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "free"_a, "goal"_a,
+          "floor"_a, "weight"_a, "threads"_a);
+    m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "free"_a, "goal"_a, "floor"_a,
+          "weight"_a, "iterations"_a, "threads"_a);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;
 

@@ -28,6 +28,7 @@ class Lbfgs {
     }
 
     Function& function() { return f_; }
+    const double* x() const { return x_.data(); }
 
     // Forgets what is known of a function that has changed; returns its value where the last minimisation ended.
     double start() {

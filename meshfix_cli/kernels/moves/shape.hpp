@@ -1,0 +1,161 @@
+// The shape of a valid mesh as one function of all its free vertices, and its gradient:
+//
+//     sum over simplices of
+//         - RATIO mean ratio - ANGLE t + weight (max(0, goal - t)^2 + FLOOR max(0, floor - t)^2),
+//
+// t the smallest angle in degrees; the goal lifts the few that are worse than the others, and the floor holds the worst.
+// It is infinite where a simplex has no positive determinant, so that a minimiser that starts from a valid mesh never
+// leaves those. The mean ratio is that of P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
+#pragma once
+
+#include "measures/angles.hpp"
+#include "moves/assembly.hpp"
+#include "moves/lbfgs.hpp"
+
+namespace meshfix {
+
+struct ShapeGoal {
+    double degrees, floor, weight;
+};
+
+// Adds `factor` times the gradient of the k-th angle by the corners, in radians: a corner that moves away from the
+// plane, or line, of a face turns that by the inverse of its distance from the edge that both faces share.
+inline void add_slopes_of_angle(const Edges<2>& e, std::size_t k, double factor, Corners<2>& slopes) {
+    const auto n = normals(e);
+    const auto [i, j] = FACES_AT<2>[k];
+    const Vec<2> at_i = (factor / norm2(n[j])) * n[j], at_j = (factor / norm2(n[i])) * n[i];
+    slopes[i] = slopes[i] + at_i;
+    slopes[j] = slopes[j] + at_j;
+    slopes[3 - i - j] = slopes[3 - i - j] - at_i - at_j;
+}
+inline void add_slopes_of_angle(const Edges<3>& e, std::size_t k, double factor, Corners<3>& slopes) {
+    static constexpr std::array<std::array<int, 2>, 6> SHARED = {{{2, 3}, {1, 3}, {1, 2}, {0, 3}, {0, 2}, {0, 1}}};
+    const Corners<3> p{Vec<3>{}, e[0], e[1], e[2]};
+    const auto n = normals(e);
+    const auto [i, j] = FACES_AT<3>[k];
+    const auto [a, b] = SHARED[k];
+    const Vec<3> along = p[b] - p[a];
+    const double length2 = norm2(along), scale = factor * std::sqrt(length2);
+    const Vec<3> at_i = (scale / norm2(n[j])) * n[j], at_j = (scale / norm2(n[i])) * n[i];
+    const double share_i = dot(p[i] - p[a], along) / length2, share_j = dot(p[j] - p[a], along) / length2;
+    slopes[i] = slopes[i] + at_i;
+    slopes[j] = slopes[j] + at_j;
+    slopes[a] = slopes[a] - (1.0 - share_i) * at_i - (1.0 - share_j) * at_j;
+    slopes[b] = slopes[b] - share_i * at_i - share_j * at_j;
+}
+
+template <int D>
+class Shape {
+   public:
+    static constexpr int DIMENSION = D;
+
+    // points (n, D), the `free` ones first; simplices (m, D+1).
+    Shape(const double* points, std::int64_t n, std::int64_t free, const std::int32_t* simplices, std::int64_t m,
+          ShapeGoal goal, int threads)
+        : assembly_(simplices, m, n), parts_(assembly_.items()), free_(free), threads_(threads), goal_(goal),
+          points_(points, points + n * D) {
+        for (std::int64_t i = 0; i < n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(n);
+        double size2 = 0.0;
+        for (std::int64_t v = 0; v < n; ++v) size2 = larger(size2, norm2(load<D>(points + v * D) - origin_));
+        // About an edge.
+        unit_ = std::sqrt(size2) / (D == 2 ? std::sqrt(static_cast<double>(n)) : std::cbrt(static_cast<double>(n)));
+        for (std::int64_t i = 0; i < n * D; ++i) points_[i] = (points_[i] - origin_[i % D]) / unit_;
+    }
+
+    Numbers start() const {
+        Numbers x(free_ * D);
+        std::copy(points_.begin(), points_.begin() + free_ * D, x.data());
+        return x;
+    }
+
+    double operator()(const double* x, double* gradient) {
+        std::copy(x, x + free_ * D, points_.begin());
+        assembly_.evaluate(free_, gradient, threads_, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+            parts_[item] = look_at(begin, end);
+        });
+        double total = 0.0;
+        for (double part : parts_) total += part;
+        return total;
+    }
+
+    bool enough() const { return false; }
+    double least_gain() const { return SHAPE_GAIN * static_cast<double>(assembly_.size()); }
+
+    // The free points (free, D) at a vector, in model units.
+    std::vector<double> free_points(const double* x) const {
+        std::vector<double> places(x, x + free_ * D);
+        for (std::int64_t i = 0; i < free_ * D; ++i) places[i] = origin_[i % D] + unit_ * places[i];
+        return places;
+    }
+
+   private:
+    double look_at(std::int64_t begin, std::int64_t end) {
+        LaneSum energy;
+        for (std::int64_t s = begin; s < end; s += LANES) {
+            const Edges<D, Pack> e = assembly_.edges(points_.data(), s, end);
+            Corners<D, Pack> slopes;
+            Pack value = of_ratio(e, slopes);
+            const auto cosine = cosines<D>(e);
+            const int count = static_cast<int>(std::min<std::int64_t>(LANES, end - s));
+            for (int i = 0; i < count; ++i) {
+                std::size_t k = 0;
+                for (std::size_t other = 1; other < cosine.size(); ++other)
+                    if (cosine[other][i] > cosine[k][i]) k = other;
+                value[i] += of_angle(e, i, k, cosine[k][i], slopes);
+            }
+            for (int i = count; i < LANES; ++i) value[i] = 0.0;
+            assembly_.add(slopes, s, count);
+            energy.add(static_cast<std::size_t>((s - begin) / LANES), value);
+        }
+        return energy.total();
+    }
+
+    static Pack of_ratio(const Edges<D, Pack>& e, Corners<D, Pack>& slopes) {
+        const Pack zero = constant<Pack>(0.0), one = constant<Pack>(1.0);
+        const Pack det = determinant(e), edges2 = sum_of_squared_edges<D>(e);
+        Pack power = det;
+        if constexpr (D == 3) {
+            const Pack root = cube_root(constant<Pack>(0.5) * larger(det, constant<Pack>(1e-300)));
+            power = root * root;
+        }
+        const Pack value = constant<Pack>(-SHAPE_RATIO * (D == 2 ? 2.0 * std::sqrt(3.0) : 12.0)) * power / edges2;
+        const Pack by_det = constant<Pack>(2.0 / D) * value / det, by_edges2 = zero - value / edges2;
+        const Edges<D, Pack> normals = determinant_slopes(e);
+        const Pack pull = constant<Pack>(2.0) * by_edges2;
+        Vec<D, Pack> middle = e[0];
+        for (int k = 1; k < D; ++k) middle = middle + e[k];
+        slopes[0] = Vec<D, Pack>{} - pull * middle;
+        for (int k = 0; k < D; ++k) {
+            slopes[k + 1] = pull * (constant<Pack>(D + 1) * e[k] - middle) + by_det * normals[k];
+            slopes[0] = slopes[0] - by_det * normals[k];
+        }
+        return select(det > zero, value, one / zero);
+    }
+
+    // Of lane i, whose smallest angle is the k-th.
+    double of_angle(const Edges<D, Pack>& edges, int i, std::size_t k, double cosine, Corners<D, Pack>& slopes) const {
+        constexpr double DEGREE = 57.29577951308232;
+        if (!(std::fabs(cosine) < 1.0)) return INFINITY;
+        const double angle = DEGREE * std::acos(cosine), missing = larger(0.0, goal_.degrees - angle);
+        const double below = SHAPE_FLOOR * larger(0.0, goal_.floor - angle);
+        Edges<D> e;
+        for (int edge = 0; edge < D; ++edge)
+            for (int x = 0; x < D; ++x) e[edge][x] = edges[edge][x][i];
+        Corners<D> mine{};
+        add_slopes_of_angle(e, k, -DEGREE * (SHAPE_ANGLE + 2.0 * goal_.weight * (missing + below)), mine);
+        for (int corner = 0; corner <= D; ++corner)
+            for (int x = 0; x < D; ++x) slopes[corner][x][i] += mine[corner][x];
+        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) - SHAPE_ANGLE * angle;
+    }
+
+    Assembly<D> assembly_;
+    std::vector<double> parts_;
+    std::int64_t free_;
+    int threads_;
+    ShapeGoal goal_;
+    std::vector<double> points_;
+    Vec<D> origin_{};
+    double unit_ = 1.0;
+};
+
+}  // namespace meshfix

@@ -131,7 +131,7 @@ def relocate(
 
     States (n,): 0 for a vertex that is held, DUE, or 1 when it has been visited and neither it nor a neighbour moved.
 
-    The threshold is that of the active-set method, or the floor of MEAN_RATIO and MEAN_ANGLE. Smoothing makes no
+    The threshold is that of the active-set method, or the floor of MEAN_RATIO. Smoothing makes no
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
@@ -199,16 +199,32 @@ def foldover_energy(
     """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
 
 def shape_energy(
-    points: Float64, simplices: Int32, free: int, goal: float, floor: float, weight: float, threads: int
+    points: Float64,
+    simplices: Int32,
+    free: int,
+    goal: float,
+    floor: float,
+    measure: float,
+    weight: float,
+    threads: int,
 ) -> tuple[float, Float64]:
-    """Energy of moves/shape.hpp and its gradient (free, d), in a unit that makes the mesh n^(1/d) in radius."""
+    """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge."""
 
 def shaped(
-    points: Float64, simplices: Int32, free: int, goal: float, floor: float, weight: float, iterations: int, threads: int
+    points: Float64,
+    simplices: Int32,
+    free: int,
+    goal: float,
+    floor: float,
+    measure: float,
+    weight: float,
+    iterations: int,
+    threads: int,
 ) -> Float64:
     """Return the first `free` points (free, d) of a valid mesh where so many iterations of L-BFGS end.
 
-    The goal and the floor are angles in degrees; `weight` is that of an element below them.
+    The goal and the floor are angles in degrees, the measure is in model units, `weight` is for what lacks a degree of
+    the goal.
     """
 
 def min_norm_point(vectors: Float64) -> Float64:
@@ -216,9 +232,6 @@ def min_norm_point(vectors: Float64) -> Float64:
 
 def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[Float64, Float64, float]:
     """Sines of a star, their gradients, and sign * (smallest sine)^2 (-1 where the star is not valid)."""
-
-def mean_angle(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, list[float]]:
-    """Sum of sin - cos of the smallest angles of a star's simplices, and its gradient (d,)."""
 
 def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, float, Float64, Float64]:
     """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""

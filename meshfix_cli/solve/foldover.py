@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.solve.region import Region
 
 Array = NDArray[np.float64]
 
@@ -111,31 +112,11 @@ def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_],
     return kernels.embedding(start, mesh, free, threads)
 
 
-class _Region:
-    """The stars of the free vertices.
-
-    Attributes
-    ----------
-    moving : (f,) int
-        The free vertices, in the numbers of the mesh.
-    vertices : (k,) int
-        These, then the others of the stars.
-    global_simplices : (s, d+1) int32
-        The simplices of the stars, in the numbers of the mesh.
-    simplices : (s, d+1) int32
-        The same, with the vertices numbered as in `vertices`.
-    """
+class _Region(Region):
+    """The stars of the free vertices, and how far these may go."""
 
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
-        simplices = mesh.simplices[free[mesh.simplices].any(axis=1)]
-        rim = np.zeros(len(free), dtype=bool)
-        rim[simplices] = True
-        self.moving = np.flatnonzero(free)
-        self.vertices = np.concatenate([self.moving, np.flatnonzero(rim & ~free)])
-        number = np.full(len(free), -1, dtype=np.int32)
-        number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
-        self.global_simplices = np.ascontiguousarray(simplices)
-        self.simplices = np.ascontiguousarray(number[simplices])
+        super().__init__(mesh, free)
         self.reach, self.threads = reach, threads
 
     def uniform(self, points: Array) -> Array:

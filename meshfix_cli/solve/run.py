@@ -15,18 +15,21 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.solve.records import SweepRecord
+from meshfix_cli.solve.shape import Goal, shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.solve.team import Team
 
-GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone
+GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone, and it may lose no more
 ANGLE_STEPS = 2.0**32  # of a radian
-FLOOR = 1  # percentile of the smallest angles: the sweeps for the mean angle let no element fall below it
+FLOOR = 1  # percentile of the smallest angles; those up to `LIFT` degrees above it count as the few that are worse
+LIFT = 3.0
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
 RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
 RAISE_PATIENCE = 2
+ROUND_RISE = 0.05  # degrees by which the smallest angle must rise for another round of "best"
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
 REGION_PATIENCE = 5  # minimisations without fewer inverted elements after which a larger region is tried
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
@@ -94,6 +97,9 @@ class Run:
         self.broken = self._broken()
         self.near = self.free & self.broken if only_invalid else self.free
         self.rival: _Start | None = None
+        self.kept: tuple[NDArray[np.float64], SweepRecord, float] | None = None
+        self.lost = False  # what the last minimisation of the shape began with
+        self.shaped = False  # since the smallest angle was raised
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
         self.untangling = 0  # sweeps
         # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
@@ -106,7 +112,9 @@ class Run:
         return self.input if self.points is self.first[0] else self.input.with_vertices(self.points)
 
     def enter(self, phase: Phase) -> bool:
-        """Prepare a phase of untangling; False: it has nothing to do, or its region is as good as the whole."""
+        """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
+        if phase.smooths:
+            return self._goes_on(phase)
         if Move.LAPLACIAN in phase.moves:
             self.hard = False
         if not self.hard if phase.embeds else self.is_done(phase):
@@ -124,6 +132,8 @@ class Run:
         self.changed[:] = False
         if phase.embeds:
             return self._another_start()
+        if phase.shapes:
+            return self._shape(phase)
         if not phase.moves:
             return self._minimisations(phase)
         if self.only_invalid and phase.rings and not phase.smooths:
@@ -260,20 +270,60 @@ class Run:
 
     def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
         near = near & self.team.own_vertices
-        threshold, states = self._floor_sine2(phase), _due(near)
+        states = _due(near)
         self.floor = self.measure if Move.COME_BACK in phase.moves else self.min_measure
         for move in cycle(phase.moves):
             if len(phase.moves) > 1:  # what was visited by one move is due for the next
                 states = _due(near)
             if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
                 states = _due(near & (self._broken() | self._grown(self.changed, 1)))
-            yield self._relocated(self.points, move, states, threshold)
+            yield self._relocated(self.points, move, states)
 
     def _another_start(self) -> Iterator[NDArray[np.float64]]:
         self.rival, self.best = self.best, None
         self.fewest, self.largest = len(self.mendable), -math.inf
         compute = partial(_embedded, self.max_move, self.threads)
         yield from self.team.of_whole(compute, self.points, self.first[0], self.near)
+
+    def _shape(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        """Yield the points where the shape of all elements is best."""
+        if self.max_move < math.inf or self.left or not self.free.any():
+            return
+        angles = self._angles(self.points)
+        smallest = self._least(angles)
+        self.kept = self.points, self.record, smallest
+        goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
+        floor = math.degrees(smallest) if phase.shapes == "lost" else 0.0
+        compute = partial(_shaped, Goal(goal, floor, max(self.min_measure, 0.0)), self.threads)
+        yield from self.team.of_whole(compute, self.points, self._smoothed(phase))
+
+    def _goes_on(self, phase: Phase) -> bool:
+        """Whether a phase of smoothing has something to do after those before."""
+        if phase.until == "ceiling":
+            goes_on, self.shaped = self.shaped, False
+            return goes_on
+        if phase.shapes == "lost" and not self.lost:
+            return False
+        if phase.shapes == "risen" and not self._has_risen():
+            return False
+        self.shaped = self.shaped or phase.shapes is not None
+        return True
+
+    def _has_risen(self) -> bool:
+        """Whether the smallest angle has risen since the last minimisation of the shape, but not to the ceiling."""
+        if self.kept is None:
+            return False
+        smallest = self._least(self._angles(self.points))
+        below = math.sin(min(smallest, math.pi / 2)) ** 2 < self._min_sine2(self.stuck)
+        return below and smallest > self.kept[2] + math.radians(ROUND_RISE)
+
+    def take_back(self) -> bool:
+        """Return to where the last minimisation of the shape began, if the smallest angle is smaller than there."""
+        if self.kept is None:
+            return False
+        points, record, smallest = self.kept
+        self.lost = self._least(self._angles(self.points)) < smallest - math.radians(GAIN)
+        return self.lost and self._return_to(points, record)
 
     def _mendings(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
         """Yield sweeps around what is below the goal, turn by turn, as long as that becomes less or better."""
@@ -318,15 +368,6 @@ class Run:
                 self.threads,
             )  # fmt: skip
         return points
-
-    def _floor_sine2(self, phase: Phase) -> float:
-        """Return that of the user or, for the means, the floor below which nothing may fall, if that is higher."""
-        floor = 0.0
-        if Move.MEAN_RATIO in phase.moves:
-            floor = self._min_sine2(self.mendable)
-        elif Move.MEAN_ANGLE in phase.moves:
-            floor = math.sin(self.team.ranked(self._angles(self.points)[self.own], FLOOR)) ** 2
-        return max(self.threshold_sine2, floor)
 
     def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
         return self.team.least(kernels.min_sine2(self.points, simplices, self.threads))
@@ -393,3 +434,14 @@ def _minimisations(
             fewest = min(fewest, left)
             if rings is not None and waited == REGION_PATIENCE:
                 break
+
+
+def _shaped(
+    goal: Goal,
+    threads: int,
+    stars: kernels.Connectivity,
+    points: NDArray[np.float64],
+    free: NDArray[np.bool_],
+) -> Iterator[NDArray[np.float64]]:
+    """Yield the points (k, d) where the shape of all elements is best."""
+    yield shaped(points, stars, free, goal, threads)

@@ -16,9 +16,8 @@ PASSES = 3  # section 4: three passes of smoothing
 MOST_PASSES = 1_000_000
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for triangles and tetrahedra
 SMOOTHING = "smoothing"
-RATIO_SWEEPS = 2  # of "best": later ones gain little
+ROUNDS = 8  # of "best", at most, after the first
 MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold
-ANGLE_SWEEPS = 3
 RINGS = (4,)  # around inverted elements in which the work begins
 REGIONS = (0, 2, 4, 8, None)  # rings around inverted elements that sweeps take in, where only those may move
 
@@ -34,8 +33,7 @@ class Move(IntEnum):
     UNTANGLE_HEIGHTS = 5
     MEAN_RATIO = 6
     RAISE_SMALLEST = 7
-    MEAN_ANGLE = 8
-    COME_BACK = 9
+    COME_BACK = 8
 
 
 Smooth = int | Literal["auto", "best"]
@@ -71,6 +69,9 @@ class Phase:
     embeds : bool
         One sweep that puts all vertices of the region at the means of their neighbours at once. It is another start,
         for meshes that Laplacian sweeps did not mend; the next phase from the best mesh takes the better one.
+    shapes : {"first", "lost", "risen"}, optional
+        One minimisation of the shape of all elements at once, from a valid mesh. "lost": from where the last one began,
+        if the smallest angle is smaller than there, with that held; "risen": if it has risen since the last one began.
     """
 
     name: str
@@ -81,6 +82,7 @@ class Phase:
     from_best: bool = False
     rings: tuple[int | None, ...] = ()
     embeds: bool = False
+    shapes: Literal["first", "lost", "risen"] | None = None
 
     @property
     def smooths(self) -> bool:
@@ -125,12 +127,12 @@ _MORE = Phase(
     until="threshold", rings=RINGS,
 )  # fmt: skip
 
-# After the passes at the threshold: what makes angles regular, the mean angle, then the few that are below the ceiling.
-_BEST = (
-    Phase(f"{SMOOTHING} the mean ratio", (Move.MEAN_RATIO,), RATIO_SWEEPS, until="settled"),
-    Phase(f"{SMOOTHING} the mean angle", (Move.MEAN_ANGLE,), ANGLE_SWEEPS, until="settled"),
-    Phase(f"{SMOOTHING} the worst", (Move.RAISE_SMALLEST,), until="ceiling"),
-)
+# After the passes at the threshold: all elements at once, then the few that are below the ceiling. Once more, with the
+# smallest angle held, where that was lost; and again as long as it rises.
+_SHAPE = Phase(f"{SMOOTHING} all at once", max_sweeps=1, until="settled", shapes="first")
+_RAISE = Phase(f"{SMOOTHING} the worst", (Move.RAISE_SMALLEST,), MOST_PASSES, until="ceiling")
+_HELD = replace(_SHAPE, name=f"{SMOOTHING} all at once, the worst held", shapes="lost")
+_BEST = (_SHAPE, _RAISE, _HELD, _RAISE, *(replace(_HELD, shapes="risen"), _RAISE) * ROUNDS)
 
 
 def plan(strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False) -> tuple[Phase, ...]:

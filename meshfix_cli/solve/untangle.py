@@ -80,7 +80,9 @@ def steps(
         untangling = not phase.smooths
         if phase.from_best and run.choose():
             yield run.mesh, run.record
-        if untangling and not run.enter(phase):
+        if phase.shapes == "lost" and run.take_back():
+            yield run.mesh, run.record
+        if not run.enter(phase):
             continue
         limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
         if untangling and sweeps is not None:
@@ -101,7 +103,7 @@ def steps(
             if stalls and waited == PATIENCE * max(1, len(phase.moves)):
                 break
             run.clock = time.perf_counter()
-    if run.choose():
+    if run.choose() or run.take_back():
         yield run.mesh, run.record
     lost = run.record.rank > run.first[1].rank or (to_the_ceiling and run.first[1].inverted == 0 and not run.gained())
     if lost and run.go_back(untangling=False):
@@ -141,9 +143,9 @@ def untangle(
         A key of `STRATEGIES`.
     smooth : int, "auto" or "best"
         Smoothing passes. "auto": `PASSES` of them, then, while something is below the threshold and gets better, sweeps
-        for the mean ratios and more passes around it. "best": `PASSES` of them, `RATIO_SWEEPS` sweeps for the mean
-        ratios, `ANGLE_SWEEPS` for the smallest angles of all simplices, and sweeps that raise the smallest of all until
-        it is that of the simplices without a free vertex or rises no more.
+        for the mean ratios and more passes around it. "best": as well, then the shape of all elements at
+        once, and sweeps that raise the smallest angle until it is that of the simplices without a free vertex or rises
+        no more.
     sweeps, threshold, max_move, only_invalid
         See `steps`.
     threads : int

@@ -325,9 +325,7 @@ def test_the_best_smoothing_is_named_in_the_report(tmp_path: Path) -> None:
         json.loads(run("untangle", "--json", "--smooth", smooth, TANGLED, tmp_path / "o.vtk").stdout)
         for smooth in (3, "best")
     ]
-    assert {"smoothing", "smoothing the mean ratio", "smoothing the mean angle"} <= {
-        sweep["phase"] for sweep in facts[1]["sweeps"]
-    }
+    assert {"smoothing", "smoothing all at once"} <= {sweep["phase"] for sweep in facts[1]["sweeps"]}
     angles = [one["quality"]["smoothed"]["mean_min_angle"] for one in facts]
     assert angles[1] > angles[0]
     assert b"best" in run("untangle", "--help").stdout

@@ -74,26 +74,6 @@ def test_mean_ratio_is_the_metrics_and_its_derivatives_are_right(random: np.rand
     assert checked > 20
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_mean_angle_is_the_metrics_and_its_slope_is_right(random: np.random.Generator, d: int) -> None:
-    checked = 0
-    for _ in range(100):
-        points, faces = random_star(random, d, spread=0.1)
-        x = random.uniform(-0.05, 0.05, d)
-        if kernels.sines(points, faces, x)[2] < 0.01:
-            continue
-        edges = points[faces] - x
-        angles = np.radians(formulas.min_angle(edges, np.linalg.det(edges)))
-        value, slope = kernels.mean_angle(points, faces, x)
-        assert value == pytest.approx((np.sin(angles) - np.cos(angles)).sum(), rel=1e-12)
-        step = 1e-7
-        for k, unit in enumerate(np.eye(d)):
-            plus, minus = (kernels.mean_angle(points, faces, x + s * step * unit)[0] for s in (1, -1))
-            assert slope[k] == pytest.approx((plus - minus) / (2 * step), rel=1e-5, abs=1e-5)
-        checked += 1
-    assert checked > 20
-
-
 def test_mean_ratio_is_infinite_where_a_simplex_is_inverted(random: np.random.Generator) -> None:
     points, faces = random_star(random, 3, spread=0.1)
     assert kernels.mean_ratio(points, faces, 3 * points[faces[0]].mean(axis=0))[1] == math.inf
@@ -189,7 +169,7 @@ def test_blocks_are_near_in_space_whatever_the_order_of_the_file(d: int, plate: 
 
 
 SMOOTHING_MOVES = (
-    Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH, Move.RAISE_SMALLEST, Move.MEAN_RATIO, Move.MEAN_ANGLE
+    Move.SMART_LAPLACIAN, Move.COMBINED_SMOOTH, Move.RAISE_SMALLEST, Move.MEAN_RATIO
 )  # fmt: skip
 
 
@@ -208,7 +188,6 @@ def test_same_bits_for_any_threads_and_any_assignment_of_blocks(fine: Mesh, move
         Move.COMBINED_SMOOTH,
         Move.MEAN_RATIO,
         Move.RAISE_SMALLEST,
-        Move.MEAN_ANGLE,
     )
     start = tangle(fine, 5, 0.3) if smoothing else tangle(fine)
     begin = fine if move is Move.COME_BACK else start
@@ -319,31 +298,6 @@ def test_the_mean_ratio_gets_better_above_the_floor(mesh: Mesh, floor: float) ->
     assert lowered > 0
 
 
-@pytest.mark.parametrize("floor", [0.0, 20.0])
-def test_the_mean_angle_rises_and_no_simplex_falls_below_the_floor(mesh: Mesh, floor: float) -> None:
-    """Element by element: what is below the floor gets no worse, what is above it stays above."""
-    points, simplices = tangle(mesh, 20, 0.3).points.copy(), mesh.topology.simplices
-    improved = 0
-    for vertex in np.flatnonzero(mesh.movable)[:400]:
-        star = np.ascontiguousarray(simplices[star_rows(mesh, vertex)[2]])
-        valid, old = worst_sine(points, star) > 0, points[vertex].copy()
-        before = np.degrees(kernels.angles(points, star, 1)[0])
-        only = mesh.movable & (np.arange(mesh.topology.n) == vertex)
-        for blocks in mesh.topology.colours:
-            relocate(mesh, Move.MEAN_ANGLE, points, blocks, only, threshold_sine2=math.sin(math.radians(floor)) ** 2)
-        after = np.degrees(kernels.angles(points, star, 1)[0])
-        if not valid or (points[vertex] == old).all():
-            assert (points[vertex] == old).all()
-            continue
-        assert (after >= np.minimum(before, floor) - 1e-9).all()
-        assert worst_sine(points, star) > 0
-        assert (np.sin(np.radians(after)) - np.cos(np.radians(after))).sum() > (
-            np.sin(np.radians(before)) - np.cos(np.radians(before))
-        ).sum() - 1e-9
-        improved += after.sum() > before.sum()
-    assert improved > 50
-
-
 def inverse_ratio(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> float:
     corners = points[simplices]
     measure = kernels.measure(points, np.ascontiguousarray(simplices), 1)[0]
@@ -391,7 +345,7 @@ def test_validity_is_relative_to_the_simplex() -> None:
 @pytest.mark.parametrize("move", [move for move in Move if move is not Move.COME_BACK])
 def test_no_vertex_goes_beyond_its_reach(mesh: Mesh, move: Move) -> None:
     start = tangle(mesh, 5, 0.3) if move in SMOOTHING_MOVES else tangle(mesh)
-    threshold = 0.01 if move in (Move.MEAN_RATIO, Move.MEAN_ANGLE) else 1.0
+    threshold = 0.01 if move is Move.MEAN_RATIO else 1.0
     for max_move in (0.0, 1e-9, 0.02):
         points = start.points.copy()
         for _ in range(3):

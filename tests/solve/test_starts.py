@@ -10,6 +10,7 @@ from meshes import tangle
 from meshfix_cli import Mesh, untangle
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise
+from meshfix_cli.solve.run import GAIN
 from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, plan
 from meshfix_cli.solve.untangle import drain, steps
 
@@ -89,6 +90,32 @@ def test_smoothing_goes_on_only_where_three_passes_leave_something(mesh: Mesh) -
         assert (f"{SMOOTHING} the rest" in phases) == (smallest < threshold)
         went_on.add(smallest < threshold)
     assert went_on == {False, True}
+
+
+@pytest.mark.parametrize("name", ["block", "O-grid", "Koch", "sphere shell"])
+def test_the_best_is_nearly_a_fixed_point_and_no_worse_than_the_default(name: str) -> None:
+    mesh, tangled = collapsed(name)
+    default = summarise(untangle(tangled).after, ("mean_ratio",))
+    best = untangle(tangled, smooth="best").after
+    one, again = (summarise(m, ("mean_ratio",)) for m in (best, untangle(best, smooth="best").after))
+    assert one.min_angle >= default.min_angle - GAIN
+    assert one.min_angle >= 0.5 * summarise(mesh).min_angle
+    assert again.min_angle - one.min_angle < 0.5
+    assert again.min_angle >= one.min_angle - GAIN
+    assert one.metrics["mean_ratio"][1] > default.metrics["mean_ratio"][1] or one.min_angle > default.min_angle + 0.1
+
+
+def test_what_the_shape_of_all_loses_of_the_worst_comes_back(mesh: Mesh) -> None:
+    """Without sweeps that raise it again, the minimisation is done once more with the smallest angle held."""
+    tangled = tangle(mesh, 25, 1)
+    raising = plan("auto", "best")
+    without = [phase for phase in raising if phase.until != "ceiling"]
+    before = drain(steps(tangled, plan("auto", "auto")))[2]
+    smallest = evaluate("min_angle", before)[mesh.movable[mesh.topology.simplices].any(axis=1)].min()
+    for phases in (raising, without):
+        after = drain(steps(tangled, phases))[2]
+        now = evaluate("min_angle", after)[mesh.movable[mesh.topology.simplices].any(axis=1)].min()
+        assert now >= smallest - GAIN
 
 
 def test_a_number_of_passes_is_exact(mesh: Mesh) -> None:

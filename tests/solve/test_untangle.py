@@ -23,7 +23,7 @@ from meshfix_cli.quality.summary import ceiling, displacement, summarise
 from meshfix_cli.report.as_json import history_csv
 from meshfix_cli.solve.foldover import MINIMISATIONS, QUICK, THOROUGH, Reach, minimisations
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.run import NEAR, REGION_PATIENCE
+from meshfix_cli.solve.run import GAIN, NEAR, REGION_PATIENCE
 from meshfix_cli.solve.strategies import SMOOTHING, STRATEGIES, SWEEPS, plan
 from meshfix_cli.solve.untangle import steps
 
@@ -93,8 +93,8 @@ def test_a_mesh_that_meets_the_target_is_left_alone(mesh: Mesh) -> None:
     assert untangle(held, threshold=80).after is held
 
 
-@pytest.mark.parametrize("smooth", [12, "best"])
-def test_smoothing_never_lowers_the_worst_quality_of_the_mesh(mesh: Mesh, smooth: int | Literal["best"]) -> None:
+@pytest.mark.parametrize("smooth", [12, "auto"])
+def test_smoothing_never_lowers_the_worst_quality_of_the_mesh(mesh: Mesh, smooth: int | Literal["auto"]) -> None:
     worst = -math.inf
     for current, record in steps(tangle(mesh, 5, 0.3), plan("auto", smooth)):
         if record.phase.startswith(SMOOTHING) or record.inverted == 0:
@@ -110,7 +110,7 @@ def test_the_best_smoothing_is_better_in_every_figure(mesh: Mesh, case: tuple[in
     default, best = untangle(tangled), untangle(tangled, smooth="best")
     one, two = summarise(default.after), summarise(best.after)
     assert best.valid
-    assert two.min_angle >= one.min_angle * (1 - 1e-9)
+    assert two.min_angle >= one.min_angle - GAIN
     assert two.mean_min_angle > one.mean_min_angle
     assert two.percentile_1 >= one.percentile_1
     assert [r.phase for r in best.records][-1].startswith(SMOOTHING)

@@ -31,12 +31,10 @@ constexpr double ACTIVE_MIN_GAIN = 1e-4;  // stopping rule 3
 constexpr double ACTIVE_KKT = 1e-6;       // stopping rule 4: length of the steepest ascent direction
 constexpr double ACTIVE_ACCEPT = 0.9;     // share of the predicted gain at which a step is taken
 
-// Smoothing of the mean ratio and of the mean angle.
+// Smoothing of the mean ratio.
 constexpr double SAME_SINE2 = 1e-12;   // by which a smallest sine^2 may differ and count as the same
 constexpr double NEWTON_PIVOT = 1e-8;  // of a diagonal element: below it the sum of mean ratios counts as not convex
 constexpr int NEWTON_TRIALS = 5;       // steps, each half as long as the one before
-constexpr double ASCENT_STEP = 0.16;   // first step for the mean angle, in star radii
-constexpr int ASCENT_TRIALS = 6;
 
 // Of the way back: smaller shares are not worth a step, and would have no end.
 constexpr double LEAST_SHARE = 0.01;
@@ -44,6 +42,7 @@ constexpr double LEAST_SHARE = 0.01;
 // Shape of all elements at once: what a mean ratio of one and a degree are worth, and the gain an element, in the mean,
 // below which an iteration is the last; the floor counts so many times the goal.
 constexpr double SHAPE_RATIO = 100.0, SHAPE_ANGLE = 0.3, SHAPE_GAIN = 1e-3, SHAPE_FLOOR = 30.0;
+constexpr double SHAPE_MEASURE = 1e5, SHAPE_MARGIN = 0.02;  // of the smallest determinant, which may not get smaller
 
 // Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:
 // files of six digits, or in single precision, make facets that only touch interpenetrate by less.

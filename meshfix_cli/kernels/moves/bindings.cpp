@@ -29,18 +29,6 @@ auto mean_ratio_py(const Matrix<const double>& neighbours, const Matrix<const st
     return std::make_tuple(value, again, to_numpy(std::move(gradient)), to_numpy(std::move(hessian), d));
 }
 
-auto mean_angle_py(const Matrix<const double>& neighbours, const Matrix<const std::uint16_t>& faces,
-                   const Vector<const double>& x) {
-    return with_dimension(neighbours.shape(1), [&](auto dimension) {
-        constexpr int D = dimension;
-        const Star<D> star = make_star<D>(neighbours, faces, x.data());
-        MeanAngle<D> angle;
-        angle.allowed.assign(star.blocks.size(), constant<Pack>(1.0));
-        const Vec<D> slope = MeanAngle<D>::slope(star, star.position);
-        return std::make_pair(angle.at(star, star.position), std::vector<double>(slope.begin(), slope.end()));
-    });
-}
-
 auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
                  const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
                  const Matrix<const double>& start, double max_move, int threads) {
@@ -154,17 +142,17 @@ auto foldover_energy_py(const Matrix<const std::int32_t>& simplices, const Matri
 
 template <int D>
 Shape<D> make_shape(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                    std::int64_t free, double goal, double floor, double weight, int threads) {
+                    std::int64_t free, double goal, double floor, double measure, double weight, int threads) {
     return {points.data(), static_cast<std::int64_t>(points.shape(0)), free, simplices.data(),
-            static_cast<std::int64_t>(simplices.shape(0)), {goal, floor, weight}, threads};
+            static_cast<std::int64_t>(simplices.shape(0)), {goal, floor, measure, weight}, threads};
 }
 
 auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                     std::int64_t free, double goal, double floor, double weight, int threads) {
+                     std::int64_t free, double goal, double floor, double measure, double weight, int threads) {
     const std::size_t d = points.shape(1);
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
     const double value = with_dimension(d, [&](auto dimension) {
-        auto shape = make_shape<dimension>(points, simplices, free, goal, floor, weight, threads);
+        auto shape = make_shape<dimension>(points, simplices, free, goal, floor, measure, weight, threads);
         const Numbers x = shape.start();
         return shape(x.data(), gradient.data());
     });
@@ -173,10 +161,10 @@ auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std:
 
 // The free points where so many iterations end.
 auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, std::int64_t free,
-               double goal, double floor, double weight, int iterations, int threads) {
+               double goal, double floor, double measure, double weight, int iterations, int threads) {
     const std::size_t d = points.shape(1);
     return to_numpy(with_dimension(d, [&](auto dimension) {
-        Lbfgs<Shape<dimension>> lbfgs(make_shape<dimension>(points, simplices, free, goal, floor, weight, threads), free * dimension,
+        Lbfgs<Shape<dimension>> lbfgs(make_shape<dimension>(points, simplices, free, goal, floor, measure, weight, threads), free * dimension,
                               threads);
         lbfgs.start();
         lbfgs.minimise(iterations);
@@ -237,11 +225,10 @@ void bind_moves(nb::module_& m) {
           "threads"_a);
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
-    m.def("mean_angle", &mean_angle_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "free"_a, "goal"_a,
-          "floor"_a, "weight"_a, "threads"_a);
+          "floor"_a, "measure"_a, "weight"_a, "threads"_a);
     m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "free"_a, "goal"_a, "floor"_a,
-          "weight"_a, "iterations"_a, "threads"_a);
+          "measure"_a, "weight"_a, "iterations"_a, "threads"_a);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;
 
@@ -260,7 +247,7 @@ void bind_moves(nb::module_& m) {
         .def_prop_ro("evaluations",
                      [](PyFoldover& self) { return self.with_problem([](auto& p) { return p.evaluations(); }); });
 
-    static_assert(static_cast<int>(Move::come_back) == 9, "the codes of strategies.Move");
+    static_assert(static_cast<int>(Move::come_back) == 8, "the codes of strategies.Move");
 }
 
 }  // namespace meshfix

@@ -8,18 +8,17 @@
 #include "moves/come_back.hpp"
 #include "moves/laplacian.hpp"
 #include "moves/linear_program.hpp"
-#include "moves/mean_angle.hpp"
 #include "moves/mean_ratio.hpp"
 
 namespace meshfix {
 
 enum class Move : int {
     laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
-    mean_angle, come_back
+    come_back
 };
 
 struct Parameters {
-    double threshold_sine2;  // the active-set method runs on stars below it; for the means: the floor
+    double threshold_sine2;  // the active-set method runs on stars below it; for the mean ratio: the floor
     double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
     const double* start;     // (n, D): where the vertices came from
     double max_move;         // how far from there they may be; infinity: anywhere
@@ -51,7 +50,6 @@ struct Relocation {
     Star<D> star{};
     LinearProgram<D> program{};
     ActiveSet<D> active_set{};
-    MeanAngle<D> mean_angle{};
 
     bool store(std::int64_t v, const Vec<D>& x) {
         const bool changed = place(v, x);
@@ -128,15 +126,14 @@ struct Relocation {
         return take(v, smoothed(quality, true));
     }
 
-    bool smooth_mean(std::int64_t v, bool angle) {
+    bool smooth_mean(std::int64_t v) {
         const double quality = min_sine2<D>(star, star.position, 0.0), floor = parameters.threshold_sine2;
         if (!(quality > 0.0)) return false;
         const auto reachable = [&](const Vec<D>& x) {
             const Vec<D> there = star.to_global(x);
             return star.to_local(parameters.max_move < INFINITY ? within_reach(v, there) : there);
         };
-        return take(v, angle ? mean_angle.improve(star, quality, floor, reachable)
-                             : improve_mean_ratio<D>(star, quality, floor, reachable));
+        return take(v, improve_mean_ratio<D>(star, quality, floor, reachable));
     }
 
     // As far back to the start as makes no determinant smaller than `min_det`; all the way to its very bits.
@@ -198,9 +195,8 @@ struct Relocation {
             case Move::smart_laplacian: counts.moved += smooth(v, false); break;
             case Move::combined_smooth: counts.moved += smooth(v, true); break;
             case Move::untangle_heights: counts.moved += untangle_heights(v); break;
-            case Move::mean_ratio: counts.moved += smooth_mean(v, false); break;
+            case Move::mean_ratio: counts.moved += smooth_mean(v); break;
             case Move::raise_smallest: counts.moved += raise_smallest(v); break;
-            case Move::mean_angle: counts.moved += smooth_mean(v, true); break;
             case Move::come_back: counts.moved += come_back(v); break;
             case Move::laplacian: break;
         }

@@ -1,9 +1,11 @@
 // The shape of a valid mesh as one function of all its free vertices, and its gradient:
 //
 //     sum over simplices of
-//         - RATIO mean ratio - ANGLE t + weight (max(0, goal - t)^2 + FLOOR max(0, floor - t)^2),
+//         - RATIO mean ratio - ANGLE t + weight (max(0, goal - t)^2 + FLOOR max(0, floor - t)^2)
+//         + MEASURE max(0, 1 + MARGIN - det / least)^2,
 //
-// t the smallest angle in degrees; the goal lifts the few that are worse than the others, and the floor holds the worst.
+// t the smallest angle in degrees; the goal lifts the few that are worse than the others, the floor holds the worst, and
+// the last term the smallest determinant, where `least` is positive.
 // It is infinite where a simplex has no positive determinant, so that a minimiser that starts from a valid mesh never
 // leaves those. The mean ratio is that of P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
 #pragma once
@@ -15,7 +17,7 @@
 namespace meshfix {
 
 struct ShapeGoal {
-    double degrees, floor, weight;
+    double degrees, floor, measure, weight;
 };
 
 // Adds `factor` times the gradient of the k-th angle by the corners, in radians: a corner that moves away from the
@@ -60,6 +62,7 @@ class Shape {
         // About an edge.
         unit_ = std::sqrt(size2) / (D == 2 ? std::sqrt(static_cast<double>(n)) : std::cbrt(static_cast<double>(n)));
         for (std::int64_t i = 0; i < n * D; ++i) points_[i] = (points_[i] - origin_[i % D]) / unit_;
+        least_ = factorial(D) * goal.measure / (D == 2 ? unit_ * unit_ : unit_ * unit_ * unit_);
     }
 
     Numbers start() const {
@@ -110,7 +113,7 @@ class Shape {
         return energy.total();
     }
 
-    static Pack of_ratio(const Edges<D, Pack>& e, Corners<D, Pack>& slopes) {
+    Pack of_ratio(const Edges<D, Pack>& e, Corners<D, Pack>& slopes) const {
         const Pack zero = constant<Pack>(0.0), one = constant<Pack>(1.0);
         const Pack det = determinant(e), edges2 = sum_of_squared_edges<D>(e);
         Pack power = det;
@@ -118,8 +121,14 @@ class Shape {
             const Pack root = cube_root(constant<Pack>(0.5) * larger(det, constant<Pack>(1e-300)));
             power = root * root;
         }
-        const Pack value = constant<Pack>(-SHAPE_RATIO * (D == 2 ? 2.0 * std::sqrt(3.0) : 12.0)) * power / edges2;
-        const Pack by_det = constant<Pack>(2.0 / D) * value / det, by_edges2 = zero - value / edges2;
+        Pack value = constant<Pack>(-SHAPE_RATIO * (D == 2 ? 2.0 * std::sqrt(3.0) : 12.0)) * power / edges2;
+        Pack by_det = constant<Pack>(2.0 / D) * value / det;
+        const Pack by_edges2 = zero - value / edges2;
+        if (least_ > 0.0) {
+            const Pack missing = larger(zero, constant<Pack>(1.0 + SHAPE_MARGIN) - det * constant<Pack>(1.0 / least_));
+            value = value + constant<Pack>(SHAPE_MEASURE) * missing * missing;
+            by_det = by_det - constant<Pack>(2.0 * SHAPE_MEASURE / least_) * missing;
+        }
         const Edges<D, Pack> normals = determinant_slopes(e);
         const Pack pull = constant<Pack>(2.0) * by_edges2;
         Vec<D, Pack> middle = e[0];
@@ -155,7 +164,7 @@ class Shape {
     ShapeGoal goal_;
     std::vector<double> points_;
     Vec<D> origin_{};
-    double unit_ = 1.0;
+    double unit_ = 1.0, least_ = 0.0;
 };
 
 }  // namespace meshfix

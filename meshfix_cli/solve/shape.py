@@ -1,0 +1,78 @@
+"""The shape of all elements of a valid mesh at once; the energy is in kernels/moves/shape.hpp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.solve.region import Region
+
+Array = NDArray[np.float64]
+
+ITERATIONS = 100
+RETREATS = 20
+WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What counts beside the mean ratios and the smallest angles of all elements.
+
+    Attributes
+    ----------
+    angle : float
+        Degrees; smaller angles count more, by the square of what they lack.
+    floor : float
+        Degrees; smaller angles count much more.
+    measure : float
+        Model units; no measure gets smaller.
+    """
+
+    angle: float
+    floor: float = 0.0
+    measure: float = 0.0
+
+
+def shaped(
+    points: Array,
+    mesh: kernels.Connectivity,
+    free: NDArray[np.bool_],
+    goal: Goal,
+    threads: int,
+) -> Array:
+    """Return the points (n, d) with the free ones (n,) where mean ratios and smallest angles are best together.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+        Of a valid mesh, which stays valid.
+    mesh : Connectivity
+        With its stars.
+    free : (n,) bool
+    goal : Goal
+    threads : int
+        The points have the same bits for any number.
+    """
+    region = Region(mesh, free)
+    moved = points.copy()
+    moved[region.moving] = kernels.shaped(
+        points[region.vertices], region.simplices, len(region.moving), goal.angle, goal.floor, goal.measure, WEIGHT,
+        ITERATIONS, threads,
+    )  # fmt: skip
+    return _retreated(points, moved, region.global_simplices, goal.measure, threads)
+
+
+def _retreated(start: Array, moved: Array, simplices: NDArray[np.int32], least: float, threads: int) -> Array:
+    """Let the vertices of simplices that are not valid, or smaller than the least measure, go back half of the way."""
+    way, share = moved - start, np.ones((len(start), 1))
+    for _ in range(RETREATS):
+        measure, valid = kernels.measure(moved, simplices, threads)
+        wrong = (valid == 0) | (measure < least)
+        if not wrong.any():
+            return moved
+        share[np.unique(simplices[wrong])] *= 0.5
+        moved = np.where(share < 1, start + share * way, moved)
+    return start

@@ -123,7 +123,7 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
 
 # After three passes, where they do not suffice.
 _MORE = Phase(
-    f"{SMOOTHING} the rest", (*(Move.MEAN_RATIO,) * 2, *(Move.COMBINED_SMOOTH,) * PASSES), MORE_SWEEPS,
+    f"{SMOOTHING} the rest", (*(Move.MEAN_RATIO,) * 2, *(Move.COMBINED_SMOOTH,) * 2), MORE_SWEEPS,
     until="threshold", rings=RINGS,
 )  # fmt: skip
 

@@ -33,7 +33,8 @@ ROUND_RISE = 0.05  # degrees by which the smallest angle must rise for another r
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
 REGION_PATIENCE = 5  # minimisations without fewer inverted elements after which a larger region is tried
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
-EASY = 3  # sweeps: a mesh that took more to untangle is smoothed up to the goal, even if nothing is below the threshold
+EASY = 3  # sweeps: a tangle that took more, and of which at least `MANY` of the elements were inverted, was a hard one
+MANY = 0.25
 GOAL = {2: 1.3, 3: 1.6}  # times the threshold: up to there, where three passes of smoothing do not suffice
 GOAL_RINGS = 4  # around the elements below the goal that are smoothed
 GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
@@ -102,6 +103,7 @@ class Run:
         self.shaped = False  # since the smallest angle was raised
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
         self.untangling = 0  # sweeps
+        self.many = self.left >= MANY * self.team.total(int(self.own.sum()))
         # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
         self.floor = self.min_measure
@@ -167,7 +169,7 @@ class Run:
         self.record = self._record(phase.name, sweep, self._count(self.changed))
         self.untangling += not phase.smooths
         if Move.LAPLACIAN in phase.moves:
-            self.hard = self.promising > 0 or sweep > EASY
+            self.hard = self.promising > 0 or (self.many and sweep > EASY)
         now = (self.points, self.record, self._rank())
         self.best = now if self.best is None else min(self.best, now, key=lambda one: one[2])
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
@@ -331,7 +333,7 @@ class Run:
         goal = min(GOAL[self.points.shape[1]] * self.threshold, math.pi / 2)
         fewest, largest, waited = len(self.mendable), -math.inf, 0
         angles = self._angles(self.points)
-        if self.untangling <= EASY and self._least(angles) >= self.threshold:
+        if self._least(angles) >= self.threshold and not (self.many and self.untangling > EASY):
             return
         while True:
             below, smallest = self.team.total(int((angles < goal)[self.own].sum())), self._least(angles)

@@ -173,17 +173,29 @@ class Foldover:
     """Minimises the foldover-free energy, for one eps after the other; see moves/foldover_problem.hpp."""
 
     def __init__(
-        self, points: Float64, simplices: Int32, sizes: Float64, centres: Float64, radius: float, threads: int
+        self,
+        points: Float64,
+        simplices: Int32,
+        sizes: Float64,
+        centres: Float64,
+        radius: float,
+        drawn: bool,
+        threads: int,
     ) -> None:
         """Take a region's points (n, d), the free ones first; each free one has a ball around its centre (free, d).
 
         `sizes` (m,) are the d-th roots of the determinants that the simplices (m, d+1) should have; all in model units.
+        Where they are `drawn`, vertices may be outside the balls, and are drawn in.
         """
-    def minimise(self, eps: float, weight: float, iterations: int, gain: float) -> tuple[float, float]:
-        """Go on from where the last one ended, until all is valid; return the energy before and after.
+    def minimise(
+        self, eps: float, weight: float, iterations: int, gain: float, pull: float = 0.0
+    ) -> tuple[float, float]:
+        """Go on from where the last one ended, until all is valid and inside; return the energy before and after.
 
         It ends as well where an iteration lowers the energy by less than this share of that of the inverted simplices.
         """
+    def evaluate(self, variables: Float64, eps: float, weight: float, pull: float) -> tuple[float, Float64]:
+        """Return the value, and its gradient, at variables (free, d), which are those of moves/foldover_problem.hpp."""
     def points(self) -> Float64:
         """Return the free points (free, d)."""
     @property

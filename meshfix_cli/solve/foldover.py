@@ -24,6 +24,8 @@ MINIMISATIONS = 30  # with one target
 ITERATIONS = 300  # of one minimisation
 SMALLEST_TARGET = 0.05  # of the median: no target of a simplex that the embedding makes flat is smaller
 LAST_EPS = 1e-10  # where all determinants are positive already
+DRAWING_EPS = 1e-2  # where vertices are drawn into reach
+PULLS = tuple(10 ** (k / 2) for k in range(18))  # on the vertices, one after the other, for each simplex
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,23 @@ def minimisations(
         yield from region.minimise(embedded, sizes, effort)  # its positions are drawn into reach
 
 
+def drawn_into_reach(
+    mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int
+) -> Iterator[Array]:
+    """Yield the points (n, d) of a valid mesh that was found where vertices may go anywhere, when all are in reach.
+
+    Nothing is yielded where there is no such mesh; where the reach is too small, drawing inverts simplices again, but
+    few. The parameters are those of `minimisations`; it begins where the vertices were.
+    """
+    if not (free.any() and 0 < reach.distance < math.inf):
+        return
+    region = _Region(mesh, free, reach, threads)
+    for points in minimisations(reach.start, mesh, free, Reach(reach.start), threads):
+        if region.is_valid(points):
+            yield from region.draw(points)
+            return
+
+
 def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int = 1) -> Array:
     """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
 
@@ -137,23 +156,44 @@ class _Region(Region):
 
     def minimise(self, start: Array, sizes: Array, effort: Effort) -> Iterator[Array]:
         """Yield the points after each minimisation; eps falls by the paper's rule in between."""
-        d = start.shape[1]
-        problem = kernels.Foldover(
-            start[self.vertices], self.simplices, sizes * math.factorial(d) ** (1 / d), self.reach.start[self.moving],
-            self.reach.distance, self.threads,
-        )  # fmt: skip
+        problem = self._problem(start, sizes)
         eps = max(1.0, -0.2 * problem.min_det)
         for _ in range(MINIMISATIONS):
             before, after = problem.minimise(eps, WEIGHT, ITERATIONS, effort.gain)
             if not (math.isfinite(after) and math.isfinite(problem.min_det)):
                 return
-            points = start.copy()
-            points[self.moving] = problem.points()
-            yield points
+            yield self._with_free(start, problem)
             if problem.min_det > 0 and abs(before - after) < 1e-5 * abs(after):
                 return
             sigma = max(1 - after / before, effort.least_share)
             eps = _next_eps(eps, problem.min_det, sigma)
+
+    def draw(self, valid: Array) -> Iterator[Array]:
+        """Yield the points of a valid mesh once they are drawn into reach; the pull rises until all of them are."""
+        problem = self._problem(valid, self.sizes(valid), drawn=True)
+        for pull in PULLS:
+            problem.minimise(DRAWING_EPS, WEIGHT, ITERATIONS, 0.0, pull * len(self.simplices))
+            points = self._with_free(valid, problem)
+            way = np.linalg.norm(points[self.moving] - self.reach.start[self.moving], axis=1)
+            if way.max() <= self.reach.distance:
+                yield points
+                return
+
+    def is_valid(self, points: Array) -> bool:
+        """Whether no simplex of the region is inverted."""
+        return len(kernels.check(points, self.global_simplices, self.threads)[0]) == 0
+
+    def _problem(self, start: Array, sizes: Array, drawn: bool = False) -> kernels.Foldover:
+        d = start.shape[1]
+        return kernels.Foldover(
+            start[self.vertices], self.simplices, sizes * math.factorial(d) ** (1 / d), self.reach.start[self.moving],
+            self.reach.distance, drawn, self.threads,
+        )  # fmt: skip
+
+    def _with_free(self, start: Array, problem: kernels.Foldover) -> Array:
+        points = start.copy()
+        points[self.moving] = problem.points()
+        return points
 
 
 def _next_eps(eps: float, least: float, sigma: float) -> float:

@@ -420,15 +420,16 @@ def _minimisations(
     broken: NDArray[np.bool_],
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
-    from meshfix_cli.solve.foldover import QUICK, THOROUGH, Reach, minimisations
+    from meshfix_cli.solve.foldover import QUICK, THOROUGH, Reach, drawn_into_reach, minimisations
 
+    reach = Reach(start, max_move)
     for rings in regions:
         near = free if rings is None else free & stars.grown(broken, rings).view(bool)
         if rings is not None and 2 * near.sum() > free.sum():
             return  # as good as the whole mesh
         efforts = (QUICK, THOROUGH) if rings is None else (QUICK,)
         fewest, waited = len(stars.simplices), 0
-        for moved in minimisations(points, stars, near, Reach(start, max_move), threads, efforts):
+        for moved in minimisations(points, stars, near, reach, threads, efforts):
             points = moved
             yield points
             left = len(kernels.check(points, stars.simplices, threads)[0])
@@ -436,6 +437,8 @@ def _minimisations(
             fewest = min(fewest, left)
             if rings is not None and waited == REGION_PATIENCE:
                 break
+        if rings is None:
+            yield from drawn_into_reach(stars, near, reach, threads)
 
 
 def _shaped(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from geometries import grid
 from meshes import built_for, tangle, with_an_inverted_fixed_simplex
 from numpy.typing import NDArray
 from scipy.optimize import fmin_l_bfgs_b
@@ -63,14 +64,14 @@ def test_the_energy_is_that_of_the_publication(random: np.random.Generator, d: i
         assert actual == pytest.approx(expected, rel=1e-12)
 
 
-def problem(mesh: Mesh, radius: float = math.inf, threads: int = 1, build: Any = kernels) -> Any:
+def problem(mesh: Mesh, radius: float = math.inf, threads: int = 1, build: Any = kernels, drawn: bool = False) -> Any:
     """All vertices of a mesh, the free ones first, with one target size; balls are around where they are."""
     free = mesh.movable
     order = np.concatenate([np.flatnonzero(free), np.flatnonzero(~free)])
     number = np.argsort(order).astype(np.int32)
     points, simplices = mesh.points[order], np.ascontiguousarray(number[mesh.topology.simplices])
     sizes = np.full(len(simplices), mesh.mean_edge_length())
-    return build.Foldover(points, simplices, sizes, points[: free.sum()].copy(), radius, threads)
+    return build.Foldover(points, simplices, sizes, points[: free.sum()].copy(), radius, drawn, threads)
 
 
 def with_free(mesh: Mesh, positions: NDArray[np.float64]) -> Mesh:
@@ -130,14 +131,61 @@ def test_the_minimum_is_that_of_another_minimiser(mesh: Mesh) -> None:
     assert ours.min_det < 0
 
 
-@pytest.mark.parametrize("radius", [math.inf, 4.0])
-def test_the_minimiser_has_the_same_bits_for_any_threads_and_any_build(fine: Mesh, radius: float) -> None:
+@pytest.mark.parametrize(("radius", "drawn"), [(math.inf, False), (4.0, False), (0.7, True)])
+def test_the_gradient_of_the_problem(mesh: Mesh, random: np.random.Generator, radius: float, drawn: bool) -> None:
+    """By the variables, against central differences along random directions; what draws adds what it is said to."""
+    start = hard(mesh)
+    unit, count = start.mean_edge_length(), int(start.movable.sum())
+    one = problem(start, radius * unit, drawn=drawn)
+    centres = (start.points[start.movable] - start.points.mean(axis=0)) / unit
+    u = random.normal(size=centres.shape) + (0.0 if radius == 4.0 else centres)
+    value, gradient = one.evaluate(u, 1.0, 0.5, 7.0)
+    tolerance = 1e-7 * float(np.linalg.norm(gradient))
+    for _ in range(20):
+        way = random.normal(size=u.shape)
+        way /= np.linalg.norm(way)
+        values = [one.evaluate(u + step * way, 1.0, 0.5, 7.0)[0] for step in (1e-5, -1e-5)]
+        assert (values[0] - values[1]) / 2e-5 == pytest.approx((gradient * way).sum(), rel=1e-4, abs=tolerance)
+    excess = np.maximum(np.linalg.norm(u - centres, axis=1) / (0.9999 * radius) - 1, 0) * drawn
+    assert value - one.evaluate(u, 1.0, 0.5, 0.0)[0] == pytest.approx(7 * (excess**2).sum(), abs=1e-9 * value)
+    assert 0 < (excess > 0).sum() < count or not drawn
+
+
+def test_what_draws_has_the_same_bits_for_any_threads(random: np.random.Generator) -> None:
+    """Of more vertices than one thread takes at a time."""
+    axis = np.linspace(0, 1, 140)
+    large = Mesh.build(*grid(axis, axis))
+    u = random.normal(size=(int(large.movable.sum()), 2))
+    seen = [problem(large, 1e-3, threads, drawn=True).evaluate(u, 1.0, 0.5, 1e3) for threads in (1, 2, 3)]
+    assert len({(value, gradient.tobytes()) for value, gradient in seen}) == 1
+    assert len(u) > 16384
+
+
+def test_vertices_are_drawn_until_all_is_valid_and_inside(mesh: Mesh) -> None:
+    """Of a tangle around where the vertices were, from a valid mesh, whose vertices are outside."""
+    tangled, unit = tangle(mesh, 100, 0.5), mesh.mean_edge_length()
+    order = np.concatenate([np.flatnonzero(mesh.movable), np.flatnonzero(~mesh.movable)])
+    simplices = np.ascontiguousarray(np.argsort(order).astype(np.int32)[mesh.topology.simplices])
+    centres, sizes = tangled.points[mesh.movable], np.full(len(simplices), unit)
+    one = kernels.Foldover(mesh.points[order], simplices, sizes, centres, 0.499 * unit, True, 1)
+
+    def outside() -> int:
+        return int((np.linalg.norm(one.points() - centres, axis=1) > 0.499 * unit).sum())
+
+    assert outside() == mesh.movable.sum()
+    one.minimise(1e-2, 0.5, 300, 0.0, 1e3 * len(simplices))
+    assert outside() == 0
+    assert not with_free(mesh, one.points()).check()[0]
+
+
+@pytest.mark.parametrize(("radius", "drawn"), [(math.inf, False), (4.0, False), (0.1, True)])
+def test_the_minimiser_has_the_same_bits_for_any_threads_and_any_build(fine: Mesh, radius: float, drawn: bool) -> None:
     """Of more simplices and vertices than one thread takes at a time."""
     start = hard(fine)
     results = set()
     for threads, build in ((1, kernels), (2, kernels), (3, kernels), (1, built_for("_any")), (1, built_for("_avx2"))):
-        one = problem(start, radius * start.mean_edge_length(), threads, build)
-        results.add((one.minimise(1.0, 0.5, 12, 0.0), one.points().tobytes(), one.min_det, one.evaluations))
+        one = problem(start, radius * start.mean_edge_length(), threads, build, drawn)
+        results.add((one.minimise(1.0, 0.5, 12, 0.0, 1e5), one.points().tobytes(), one.min_det, one.evaluations))
     assert len(results) == 1
     assert len(fine.topology.simplices) > 8192
 

@@ -57,8 +57,9 @@ constexpr double LBFGS_FARTHER = 4.0;  // times the last trial, where the minimu
 constexpr double WOLFE_VALUE = 1e-4;   // share of the first slope by which the value must fall
 constexpr double WOLFE_SLOPE = 0.9;    // share of it that may be left
 
-// Foldover-free energy: an iteration that lowers it by less, relative, ends a minimisation.
-constexpr double FOLDOVER_EXACT = 2e-9;
+// Foldover-free energy: an iteration that lowers it by less, relative, ends a minimisation; vertices are drawn into balls
+// of so much of the radius.
+constexpr double FOLDOVER_EXACT = 2e-9, FOLDOVER_INNER = 0.9999;
 
 // Embedding: length of the residual, of that at the start.
 constexpr double EMBEDDING_EXACT = 1e-5;

@@ -185,32 +185,45 @@ struct PyFoldover {
 template <int D>
 PyFoldover make_foldover(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                          const Vector<const double>& sizes, const Matrix<const double>& centres, double radius,
-                         int threads) {
+                         bool drawn, int threads) {
     const FoldoverRegion<D> region{points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
                                    sizes.data(), static_cast<std::int64_t>(simplices.shape(0)), centres.data(),
-                                   static_cast<std::int64_t>(centres.shape(0)), radius};
+                                   static_cast<std::int64_t>(centres.shape(0)), radius, drawn};
     Lbfgs<FoldoverProblem<D>> lbfgs(FoldoverProblem<D>(region, threads), region.free * D, threads);
     lbfgs.start();
     return {std::move(lbfgs)};
 }
 
 void init_foldover(PyFoldover* self, const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                   const Vector<const double>& sizes, const Matrix<const double>& centres, double radius, int threads) {
+                   const Vector<const double>& sizes, const Matrix<const double>& centres, double radius, bool drawn,
+                   int threads) {
     new (self) PyFoldover(with_dimension(points.shape(1), [&](auto d) {
-        return make_foldover<d>(points, simplices, sizes, centres, radius, threads);
+        return make_foldover<d>(points, simplices, sizes, centres, radius, drawn, threads);
     }));
 }
 
-auto minimise_py(PyFoldover& self, double eps, double weight, int iterations, double gain) {
+auto minimise_py(PyFoldover& self, double eps, double weight, int iterations, double gain, double pull) {
     const nb::gil_scoped_release release;
     return std::visit(
         [&](auto& lbfgs) {
             lbfgs.function().regularisation = {eps, weight};
             lbfgs.function().gain = gain;
+            lbfgs.function().pull = pull;
             const double before = lbfgs.start(), after = lbfgs.minimise(iterations);
             return std::make_pair(before, after);
         },
         self.lbfgs);
+}
+
+// The value and its gradient (free, D) at other variables; the next minimisation goes on from where the last one ended.
+auto evaluate_py(PyFoldover& self, const Matrix<const double>& variables, double eps, double weight, double pull) {
+    std::vector<double> gradient(variables.size());
+    const double value = self.with_problem([&](auto& problem) {
+        problem.regularisation = {eps, weight};
+        problem.pull = pull;
+        return problem(variables.data(), gradient.data());
+    });
+    return std::make_pair(value, to_numpy(std::move(gradient), variables.shape(1)));
 }
 
 }  // namespace
@@ -237,8 +250,9 @@ void bind_moves(nb::module_& m) {
           "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a, "threads"_a);
     nb::class_<PyFoldover>(m, "Foldover")
         .def("__init__", &init_foldover, "points"_a.noconvert(), "simplices"_a.noconvert(), "sizes"_a.noconvert(),
-             "centres"_a.noconvert(), "radius"_a, "threads"_a)
-        .def("minimise", &minimise_py, "eps"_a, "weight"_a, "iterations"_a, "gain"_a)
+             "centres"_a.noconvert(), "radius"_a, "drawn"_a, "threads"_a)
+        .def("minimise", &minimise_py, "eps"_a, "weight"_a, "iterations"_a, "gain"_a, "pull"_a = 0.0)
+        .def("evaluate", &evaluate_py, "variables"_a.noconvert(), "eps"_a, "weight"_a, "pull"_a)
         .def("points", [](PyFoldover& self) {
             return self.with_problem(
                 [](auto& p) { return to_numpy(p.free_points(), static_cast<std::size_t>(p.DIMENSION)); });

@@ -1,9 +1,13 @@
 // The foldover-free energy as a function of the free vertices of a region, each of which may be bound to a ball.
 //
 // Its variables are the positions, in the unit of the region from its origin; where there are balls, points u of all of
-// space: the position is centre + radius u / sqrt(1 + u^2).
+// space: the position is centre + radius u / sqrt(1 + u^2). Or vertices begin outside of the balls and are drawn in:
+// then the variables are the positions, and to the energy comes
+//
+//     pull * sum over free vertices of  max(0, |x - centre| / (FOLDOVER_INNER radius) - 1)^2.
 #pragma once
 
+#include <numeric>
 #include <vector>
 
 #include "measures/measures.hpp"
@@ -13,7 +17,7 @@
 namespace meshfix {
 
 // What a region is given as, in model units: points (n, D), the `free` ones first; simplices (m, D+1) and their sizes
-// (m); a ball for each free vertex; an infinite radius: none.
+// (m); a ball for each free vertex; an infinite radius: none. Where vertices are `drawn`, they may be outside.
 template <int D>
 struct FoldoverRegion {
     const double* points;
@@ -24,6 +28,7 @@ struct FoldoverRegion {
     const double* centres;
     std::int64_t free;
     double radius;
+    bool drawn;
 };
 
 template <int D>
@@ -32,6 +37,7 @@ class FoldoverProblem {
     static constexpr int DIMENSION = D;
     Regularisation regularisation{1.0, 1.0};
     double gain = 0.0;  // share of the energy of the inverted simplices by which an iteration must lower it, to go on
+    double pull = 0.0;  // with which vertices are drawn into their balls
 
     FoldoverProblem(const FoldoverRegion<D>& region, int threads)
         : energy_(region.simplices, region.m, region.n),
@@ -41,7 +47,9 @@ class FoldoverProblem {
           local_(region.n * D),
           sizes_(region.sizes, region.sizes + region.m),
           centres_(region.centres, region.centres + region.free * D),
-          reach_(region.radius) {
+          reach_(region.radius),
+          drawn_(region.drawn),
+          parts_(region.free / PER_ITEM + 1) {
         for (double size : sizes_) unit_ += size / static_cast<double>(region.m);
         for (double& size : sizes_) size /= unit_;
         for (std::int64_t i = 0; i < region.n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(region.n);
@@ -74,6 +82,7 @@ class FoldoverProblem {
                 save(pulled_back(load<D>(u + v * D), load<D>(gradient + v * D)), gradient, v);
             });
         }
+        if (drawn_) last_.energy += draw(gradient);
         valid_ = last_.min_det > 0.0 && is_valid();
         ++evaluations_;
         return last_.energy;
@@ -110,7 +119,7 @@ class FoldoverProblem {
 
     static void save(const Vec<D>& x, double* to, std::int64_t v) { std::copy(x.begin(), x.end(), to + v * D); }
 
-    bool bound() const { return reach_ < INFINITY; }
+    bool bound() const { return reach_ < INFINITY && !drawn_; }
 
     Vec<D> to_local(const Vec<D>& x) const { return (1.0 / unit_) * (x - origin_); }
     Vec<D> centre(std::int64_t v) const { return to_local(load<D>(centres_.data() + v * D)); }
@@ -125,10 +134,32 @@ class FoldoverProblem {
         return (radius_ / std::sqrt(square)) * (slope - (dot(u, slope) / square) * u);
     }
 
+    // What draws vertices into the balls; its gradient is added.
+    double draw(double* gradient) {
+        const double inner = FOLDOVER_INNER * radius_;
+        for_each_range(free_, PER_ITEM, threads_, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+            parts_[item] = 0.0;
+            for (std::int64_t v = begin; v < end; ++v) {
+                const Vec<D> way = load<D>(local_.data() + v * D) - centre(v);
+                const double length = std::sqrt(norm2(way)), excess = length / inner - 1.0;
+                if (!(excess > 0.0)) continue;
+                parts_[item] += pull * excess * excess;
+                save(load<D>(gradient + v * D) + (2.0 * pull * excess / (inner * length)) * way, gradient, v);
+            }
+        });
+        return std::accumulate(parts_.begin(), parts_.end(), 0.0);
+    }
+
+    bool is_inside() const {
+        for (std::int64_t v = 0; v < free_; ++v)
+            if (std::sqrt(norm2(load<D>(points_.data() + v * D) - load<D>(centres_.data() + v * D))) > reach_) return false;
+        return true;
+    }
+
     // By the predicate of the whole package, where the points will be stored.
     bool is_valid() {
         place();
-        return check<D>(points_.data(), energy_.simplices().data(), energy_.size(), threads_).inverted.empty();
+        return (!drawn_ || is_inside()) && check<D>(points_.data(), energy_.simplices().data(), energy_.size(), threads_).inverted.empty();
     }
 
     Foldover<D> energy_;
@@ -136,6 +167,8 @@ class FoldoverProblem {
     int threads_;
     std::vector<double> points_, local_, sizes_, centres_;
     double reach_, unit_ = 0.0, radius_ = INFINITY;
+    bool drawn_;
+    std::vector<double> parts_;  // of what draws, for each item
     Vec<D> origin_{};
     EnergyValue last_;
     bool valid_ = false;

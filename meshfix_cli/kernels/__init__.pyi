@@ -176,7 +176,7 @@ class Foldover:
         self,
         points: Float64,
         simplices: Int32,
-        sizes: Float64,
+        targets: Float64,
         centres: Float64,
         radius: float,
         drawn: bool,
@@ -184,13 +184,16 @@ class Foldover:
     ) -> None:
         """Take a region's points (n, d), the free ones first; each free one has a ball around its centre (free, d).
 
-        `sizes` (m,) are the d-th roots of the determinants that the simplices (m, d+1) should have; all in model units.
-        Where they are `drawn`, vertices may be outside the balls, and are drawn in.
+        Targets (m,) are the d-th roots of the determinants that the simplices (m, d+1) should have, those (m, d, d) the
+        inverses of matrices whose columns are the edges that they should have; all in model units. Where they are
+        `drawn`, vertices may be outside the balls, and are drawn in.
         """
     def minimise(
-        self, eps: float, weight: float, iterations: int, gain: float, pull: float = 0.0
+        self, eps: float, weight: float, iterations: int, gain: float, pull: float = 0.0, until_valid: bool = True
     ) -> tuple[float, float]:
-        """Go on from where the last one ended, until all is valid and inside; return the energy before and after.
+        """Go on from where the last one ended, until all is valid and inside, if that is enough.
+
+        Returns the energy before and after.
 
         It ends as well where an iteration lowers the energy by less than this share of that of the inverted simplices.
         """
@@ -206,9 +209,9 @@ class Foldover:
         """How often the energy was evaluated."""
 
 def foldover_energy(
-    simplices: Int32, points: Float64, sizes: Float64, eps: float, weight: float, free: int, threads: int
+    simplices: Int32, points: Float64, targets: Float64, eps: float, weight: float, free: int, threads: int
 ) -> tuple[float, Float64, float]:
-    """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J."""
+    """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J; see `Foldover`."""
 
 def shape_energy(
     points: Float64,

@@ -139,30 +139,32 @@ class _Region(Region):
         self.reach, self.threads = reach, threads
 
     def uniform(self, points: Array) -> Array:
-        """Return one target size for all (s,): the region's signed measure, which its boundary fixes, in equal parts.
+        """Return one target for all (s,): the region's signed measure, which its boundary fixes, in equal parts.
 
-        A size is the d-th root of a measure, in model units.
+        A target is the size of a regular simplex: the d-th root of its determinant, in model units.
         """
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         # A region whose own boundary is turned inside out may have no measure, or a negative one.
         mean = max(measure.mean(), 1e-3 * np.abs(measure).mean())
-        return np.full(len(measure), max(mean, np.finfo(float).tiny) ** (1 / points.shape[1]))
+        size = max(mean, np.finfo(float).tiny) ** (1 / points.shape[1])
+        return _of_determinants(np.full(len(measure), size), points.shape[1])
 
     def sizes(self, points: Array) -> Array:
-        """Return the sizes (s,) that the simplices have at positions (n, d), none much smaller than the others."""
+        """Return targets (s,) of the sizes that the simplices have at positions (n, d), none much smaller than others."""
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         sizes = np.abs(measure) ** (1 / points.shape[1])
-        return np.maximum(sizes, max(SMALLEST_TARGET * np.median(sizes), np.finfo(float).tiny))
+        sizes = np.maximum(sizes, max(SMALLEST_TARGET * np.median(sizes), np.finfo(float).tiny))
+        return _of_determinants(sizes, points.shape[1])
 
-    def minimise(self, start: Array, sizes: Array, effort: Effort) -> Iterator[Array]:
+    def minimise(self, start: Array, targets: Array, effort: Effort) -> Iterator[Array]:
         """Yield the points after each minimisation; eps falls by the paper's rule in between."""
-        problem = self._problem(start, sizes)
+        problem = self._problem(start, targets)
         eps = max(1.0, -0.2 * problem.min_det)
         for _ in range(MINIMISATIONS):
             before, after = problem.minimise(eps, WEIGHT, ITERATIONS, effort.gain)
             if not (math.isfinite(after) and math.isfinite(problem.min_det)):
                 return
-            yield self._with_free(start, problem)
+            yield self._moved(start, problem)
             if problem.min_det > 0 and abs(before - after) < 1e-5 * abs(after):
                 return
             sigma = max(1 - after / before, effort.least_share)
@@ -173,7 +175,7 @@ class _Region(Region):
         problem = self._problem(valid, self.sizes(valid), drawn=True)
         for pull in PULLS:
             problem.minimise(DRAWING_EPS, WEIGHT, ITERATIONS, 0.0, pull * len(self.simplices))
-            points = self._with_free(valid, problem)
+            points = self._moved(valid, problem)
             way = np.linalg.norm(points[self.moving] - self.reach.start[self.moving], axis=1)
             if way.max() <= self.reach.distance:
                 yield points
@@ -183,17 +185,22 @@ class _Region(Region):
         """Whether no simplex of the region is inverted."""
         return len(kernels.check(points, self.global_simplices, self.threads)[0]) == 0
 
-    def _problem(self, start: Array, sizes: Array, drawn: bool = False) -> kernels.Foldover:
-        d = start.shape[1]
+    def _problem(self, start: Array, targets: Array, drawn: bool = False) -> kernels.Foldover:
+        """Make the energy of targets (s,), or of the inverse matrices (s, d, d) of those."""
         return kernels.Foldover(
-            start[self.vertices], self.simplices, sizes * math.factorial(d) ** (1 / d), self.reach.start[self.moving],
-            self.reach.distance, drawn, self.threads,
+            start[self.vertices], self.simplices, targets, self.reach.start[self.moving], self.reach.distance, drawn,
+            self.threads,
         )  # fmt: skip
 
-    def _with_free(self, start: Array, problem: kernels.Foldover) -> Array:
+    def _moved(self, start: Array, problem: kernels.Foldover) -> Array:
         points = start.copy()
         points[self.moving] = problem.points()
         return points
+
+
+def _of_determinants(sizes: Array, d: int) -> Array:
+    """Turn d-th roots of measures into those of determinants."""
+    return sizes * math.factorial(d) ** (1 / d)
 
 
 def _next_eps(eps: float, least: float, sigma: float) -> float:

@@ -13,6 +13,8 @@ class Region:
 
     Attributes
     ----------
+    rows : (s,) int
+        The simplices of the stars.
     moving : (f,) int
         The free vertices, in the numbers of the mesh.
     vertices : (k,) int
@@ -24,7 +26,8 @@ class Region:
     """
 
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_]) -> None:
-        simplices = mesh.simplices[free[mesh.simplices].any(axis=1)]
+        self.rows = np.flatnonzero(free[mesh.simplices].any(axis=1))
+        simplices = mesh.simplices[self.rows]
         rim = np.zeros(len(free), dtype=bool)
         rim[simplices] = True
         self.moving = np.flatnonzero(free)

@@ -18,19 +18,23 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.mesh import Mesh
 
 
+@pytest.mark.parametrize("shaped", [False, True])
 @pytest.mark.parametrize("d", [2, 3])
-def test_gradient_of_the_foldover_free_energy(random: np.random.Generator, d: int) -> None:
-    """Against central differences, with regular and with inverted simplices, and for any threads."""
+def test_gradient_of_the_foldover_free_energy(random: np.random.Generator, d: int, shaped: bool) -> None:
+    """Against central differences, with regular and with inverted simplices, for any targets and any threads."""
     n, free = 40, 25
     points = random.normal(size=(n, d))
     simplices = np.array([random.permutation(n)[: d + 1] for _ in range(123)], dtype=np.int32)
     sizes = random.uniform(0.5, 2.0, len(simplices))
+    inverses = np.eye(d) + random.uniform(-0.4, 0.4, (len(simplices), d, d))
+    targets = inverses if shaped else sizes
 
     def value(p: NDArray[np.float64]) -> float:
-        return kernels.foldover_energy(simplices, p, sizes, 0.4, 0.3, free, 1)[0]
+        return kernels.foldover_energy(simplices, p, targets, 0.4, 0.3, free, 1)[0]
 
-    total, gradient, least = kernels.foldover_energy(simplices, points, sizes, 0.4, 0.3, free, 1)
-    jacobians = np.linalg.det(points[simplices[:, 1:]] - points[simplices[:, :1]]) / sizes**d
+    total, gradient, least = kernels.foldover_energy(simplices, points, targets, 0.4, 0.3, free, 1)
+    jacobians = np.linalg.det(points[simplices[:, 1:]] - points[simplices[:, :1]])
+    jacobians *= np.linalg.det(inverses) if shaped else sizes**-d
     assert least == pytest.approx(jacobians.min(), rel=1e-12)
     expected = np.zeros_like(gradient)
     for vertex, k in np.ndindex(free, d):
@@ -38,7 +42,7 @@ def test_gradient_of_the_foldover_free_energy(random: np.random.Generator, d: in
         step[vertex, k] = 1e-5
         expected[vertex, k] = (value(points + step) - value(points - step)) / 2e-5
     np.testing.assert_allclose(gradient, expected, rtol=1e-5, atol=1e-7 * np.abs(expected).max())
-    again = kernels.foldover_energy(simplices, points, sizes, 0.4, 0.3, free, 3)
+    again = kernels.foldover_energy(simplices, points, targets, 0.4, 0.3, free, 3)
     assert (again[0], again[1].tobytes()) == (total, gradient.tobytes())
 
 
@@ -60,18 +64,32 @@ def test_the_energy_is_that_of_the_publication(random: np.random.Generator, d: i
         det = np.linalg.det(jacobian)
         chi = (det + math.hypot(det, eps)) / 2
         expected = np.trace(jacobian.T @ jacobian) / chi ** (2 / d) + 0.3 * (1 + det**2) / chi
-        actual = kernels.foldover_energy(simplex, points, np.array([1.7]), eps, 0.3, d + 1, 1)[0]
-        assert actual == pytest.approx(expected, rel=1e-12)
+        for targets in (np.array([1.7]), np.linalg.inv(reference)[None] / 1.7):
+            actual = kernels.foldover_energy(simplex, points, targets, eps, 0.3, d + 1, 1)[0]
+            assert actual == pytest.approx(expected, rel=1e-12)
 
 
-def problem(mesh: Mesh, radius: float = math.inf, threads: int = 1, build: Any = kernels, drawn: bool = False) -> Any:
-    """All vertices of a mesh, the free ones first, with one target size; balls are around where they are."""
+def problem(
+    mesh: Mesh,
+    radius: float = math.inf,
+    threads: int = 1,
+    build: Any = kernels,
+    *,
+    shaped: bool = False,
+    drawn: bool = False,
+) -> Any:
+    """All vertices of a mesh, the free ones first; balls are around where they are.
+
+    Targets have one size: regular ones, or half a cube of it.
+    """
     free = mesh.movable
     order = np.concatenate([np.flatnonzero(free), np.flatnonzero(~free)])
     number = np.argsort(order).astype(np.int32)
     points, simplices = mesh.points[order], np.ascontiguousarray(number[mesh.topology.simplices])
-    sizes = np.full(len(simplices), mesh.mean_edge_length())
-    return build.Foldover(points, simplices, sizes, points[: free.sum()].copy(), radius, drawn, threads)
+    targets = np.full(len(simplices), mesh.mean_edge_length())
+    if shaped:
+        targets = np.eye(mesh.dimension) / targets[:, None, None]
+    return build.Foldover(points, simplices, targets, points[: free.sum()].copy(), radius, drawn, threads)
 
 
 def with_free(mesh: Mesh, positions: NDArray[np.float64]) -> Mesh:
@@ -178,13 +196,35 @@ def test_vertices_are_drawn_until_all_is_valid_and_inside(mesh: Mesh) -> None:
     assert not with_free(mesh, one.points()).check()[0]
 
 
+@pytest.mark.parametrize("radius", [math.inf, 0.5])
+def test_where_valid_points_are_not_enough_the_minimiser_goes_on_to_the_targets(mesh: Mesh, radius: float) -> None:
+    """From vertices a little beside where all elements have the shapes of their targets, which is the minimum."""
+    exact, free = mesh.points, mesh.movable
+    order = np.concatenate([np.flatnonzero(free), np.flatnonzero(~free)])
+    simplices = np.ascontiguousarray(np.argsort(order)[mesh.topology.simplices].astype(np.int32))
+    points, start = exact[order], tangle(mesh, 100, 0.1).points[order]
+    edges = points[simplices[:, 1:]] - points[simplices[:, :1]]
+    inverses = np.ascontiguousarray(np.linalg.inv(np.swapaxes(edges, 1, 2)))
+    reach = radius * mesh.mean_edge_length()
+    one = kernels.Foldover(start, simplices, inverses, start[: free.sum()].copy(), reach, False, 1)
+    one.minimise(1e-10, 0.5, 0, 0.0)
+    assert one.points() == pytest.approx(start[: free.sum()], abs=1e-12)
+    before, after = one.minimise(1e-10, 0.5, 500, 0.0, until_valid=False)
+    d = mesh.dimension
+    assert before > after == pytest.approx((d + 1) * len(simplices), rel=1e-6)
+    assert np.abs(one.points() - points[: free.sum()]).max() < 1e-3 * mesh.mean_edge_length()
+
+
+@pytest.mark.parametrize("shaped", [False, True])
 @pytest.mark.parametrize(("radius", "drawn"), [(math.inf, False), (4.0, False), (0.1, True)])
-def test_the_minimiser_has_the_same_bits_for_any_threads_and_any_build(fine: Mesh, radius: float, drawn: bool) -> None:
+def test_the_minimiser_has_the_same_bits_for_any_threads_and_any_build(
+    fine: Mesh, radius: float, drawn: bool, shaped: bool
+) -> None:
     """Of more simplices and vertices than one thread takes at a time."""
     start = hard(fine)
     results = set()
     for threads, build in ((1, kernels), (2, kernels), (3, kernels), (1, built_for("_any")), (1, built_for("_avx2"))):
-        one = problem(start, radius * start.mean_edge_length(), threads, build, drawn)
+        one = problem(start, radius * start.mean_edge_length(), threads, build, shaped=shaped, drawn=drawn)
         results.add((one.minimise(1.0, 0.5, 12, 0.0, 1e5), one.points().tobytes(), one.min_det, one.evaluations))
     assert len(results) == 1
     assert len(fine.topology.simplices) > 8192

@@ -1,4 +1,5 @@
 // Bindings of the moves of vertices, of what each of them computes, and of the foldover-free energy.
+#include <type_traits>
 #include <variant>
 
 #include "measures/python.hpp"
@@ -128,14 +129,21 @@ auto embedding_py(const Matrix<const double>& points, const PyConnectivity& self
     return to_numpy(std::move(embedded), points.shape(1));
 }
 
+// Targets (m,) are the sizes of regular ones, those (m, D, D) the inverses of the matrices of any.
+using Sizes = Vector<const double>;
+using Inverses = Matrices<const double>;
+template <int D, class Targets>
+using TargetOf = std::conditional_t<std::is_same_v<Targets, Sizes>, RegularTarget<D>, ShapedTarget<D>>;
+
+template <class Targets>
 auto foldover_energy_py(const Matrix<const std::int32_t>& simplices, const Matrix<const double>& points,
-                        const Vector<const double>& sizes, double eps, double weight, std::int64_t free, int threads) {
+                        const Targets& targets, double eps, double weight, std::int64_t free, int threads) {
     const std::size_t d = points.shape(1);
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
     const EnergyValue value = with_dimension(d, [&](auto dimension) {
-        Foldover<dimension> energy(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)),
-                                   static_cast<std::int64_t>(points.shape(0)));
-        return energy.evaluate(points.data(), sizes.data(), {eps, weight}, free, gradient.data(), threads);
+        Foldover<dimension, TargetOf<dimension, Targets>> energy(
+            simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), static_cast<std::int64_t>(points.shape(0)));
+        return energy.evaluate(points.data(), targets.data(), {eps, weight}, free, gradient.data(), threads);
     });
     return std::make_tuple(value.energy, to_numpy(std::move(gradient), d), value.min_det);
 }
@@ -174,7 +182,10 @@ auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32
 
 // Minimises the energy for one eps after the other, each time from where the last one ended.
 struct PyFoldover {
-    std::variant<Lbfgs<FoldoverProblem<2>>, Lbfgs<FoldoverProblem<3>>> lbfgs;
+    template <int D, class Targets>
+    using Minimiser = Lbfgs<FoldoverProblem<D, TargetOf<D, Targets>>>;
+
+    std::variant<Minimiser<2, Sizes>, Minimiser<3, Sizes>, Minimiser<2, Inverses>, Minimiser<3, Inverses>> lbfgs;
 
     template <class F>
     auto with_problem(const F& f) {
@@ -182,33 +193,30 @@ struct PyFoldover {
     }
 };
 
-template <int D>
-PyFoldover make_foldover(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                         const Vector<const double>& sizes, const Matrix<const double>& centres, double radius,
-                         bool drawn, int threads) {
-    const FoldoverRegion<D> region{points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
-                                   sizes.data(), static_cast<std::int64_t>(simplices.shape(0)), centres.data(),
-                                   static_cast<std::int64_t>(centres.shape(0)), radius, drawn};
-    Lbfgs<FoldoverProblem<D>> lbfgs(FoldoverProblem<D>(region, threads), region.free * D, threads);
-    lbfgs.start();
-    return {std::move(lbfgs)};
-}
-
+template <class Targets>
 void init_foldover(PyFoldover* self, const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                   const Vector<const double>& sizes, const Matrix<const double>& centres, double radius, bool drawn,
+                   const Targets& targets, const Matrix<const double>& centres, double radius, bool drawn,
                    int threads) {
-    new (self) PyFoldover(with_dimension(points.shape(1), [&](auto d) {
-        return make_foldover<d>(points, simplices, sizes, centres, radius, drawn, threads);
+    new (self) PyFoldover(with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const FoldoverRegion<D> region{points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
+                                       targets.data(), static_cast<std::int64_t>(simplices.shape(0)), centres.data(),
+                                       static_cast<std::int64_t>(centres.shape(0)), radius, drawn};
+        PyFoldover::Minimiser<D, Targets> lbfgs({region, threads}, region.free * D, threads);
+        lbfgs.start();
+        return PyFoldover{std::move(lbfgs)};
     }));
 }
 
-auto minimise_py(PyFoldover& self, double eps, double weight, int iterations, double gain, double pull) {
+auto minimise_py(PyFoldover& self, double eps, double weight, int iterations, double gain, double pull,
+                 bool until_valid) {
     const nb::gil_scoped_release release;
     return std::visit(
         [&](auto& lbfgs) {
             lbfgs.function().regularisation = {eps, weight};
             lbfgs.function().gain = gain;
             lbfgs.function().pull = pull;
+            lbfgs.function().until_valid = until_valid;
             const double before = lbfgs.start(), after = lbfgs.minimise(iterations);
             return std::make_pair(before, after);
         },
@@ -224,6 +232,14 @@ auto evaluate_py(PyFoldover& self, const Matrix<const double>& variables, double
         return problem(variables.data(), gradient.data());
     });
     return std::make_pair(value, to_numpy(std::move(gradient), variables.shape(1)));
+}
+
+template <class Targets>
+void bind_foldover(nb::module_& m, nb::class_<PyFoldover>& foldover) {
+    m.def("foldover_energy", &foldover_energy_py<Targets>, "simplices"_a.noconvert(), "points"_a.noconvert(),
+          "targets"_a.noconvert(), "eps"_a, "weight"_a, "free"_a, "threads"_a);
+    foldover.def("__init__", &init_foldover<Targets>, "points"_a.noconvert(), "simplices"_a.noconvert(),
+                 "targets"_a.noconvert(), "centres"_a.noconvert(), "radius"_a, "drawn"_a, "threads"_a);
 }
 
 }  // namespace
@@ -246,12 +262,11 @@ void bind_moves(nb::module_& m) {
     m.attr("DUE") = DUE;
 
     m.def("embedding", &embedding_py, "points"_a.noconvert(), "mesh"_a, "free"_a.noconvert(), "threads"_a);
-    m.def("foldover_energy", &foldover_energy_py, "simplices"_a.noconvert(), "points"_a.noconvert(),
-          "sizes"_a.noconvert(), "eps"_a, "weight"_a, "free"_a, "threads"_a);
-    nb::class_<PyFoldover>(m, "Foldover")
-        .def("__init__", &init_foldover, "points"_a.noconvert(), "simplices"_a.noconvert(), "sizes"_a.noconvert(),
-             "centres"_a.noconvert(), "radius"_a, "drawn"_a, "threads"_a)
-        .def("minimise", &minimise_py, "eps"_a, "weight"_a, "iterations"_a, "gain"_a, "pull"_a = 0.0)
+    nb::class_<PyFoldover> foldover(m, "Foldover");
+    bind_foldover<Sizes>(m, foldover);
+    bind_foldover<Inverses>(m, foldover);
+    foldover.def("minimise", &minimise_py, "eps"_a, "weight"_a, "iterations"_a, "gain"_a, "pull"_a = 0.0,
+                 "until_valid"_a = true)
         .def("evaluate", &evaluate_py, "variables"_a.noconvert(), "eps"_a, "weight"_a, "pull"_a)
         .def("points", [](PyFoldover& self) {
             return self.with_problem(

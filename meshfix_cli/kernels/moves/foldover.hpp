@@ -4,14 +4,14 @@
 //     sum over simplices of  tr(J^T J) / chi(det J)^(2/D) + weight (1 + det(J)^2) / chi(det J),
 //     chi(t) = (t + sqrt(eps^2 + t^2)) / 2,
 //
-// J maps a regular simplex of determinant size^D to the simplex; then tr(J^T J) is a multiple of the sum of the
-// squared edges.
+// J maps the target of a simplex to the simplex: see targets.hpp.
 //
 // simplices (m, D+1) vertex numbers, the `free` vertices that move before the others
-// sizes (m)          target of each simplex, in the unit of the points
+// targets            the numbers of each simplex's target, in the unit of the points
 #pragma once
 
 #include "moves/assembly.hpp"
+#include "moves/targets.hpp"
 
 namespace meshfix {
 
@@ -36,7 +36,7 @@ struct EnergyValue {
     double energy = 0.0, of_inverted = 0.0, min_det = INFINITY;
 };
 
-template <int D>
+template <int D, class Target>
 class Foldover {
    public:
     Foldover(const std::int32_t* simplices, std::int64_t m, std::int64_t n)
@@ -46,10 +46,10 @@ class Foldover {
     std::int64_t size() const { return assembly_.size(); }
 
     // gradient (free, D).
-    EnergyValue evaluate(const double* points, const double* sizes, Regularisation r, std::int64_t free,
+    EnergyValue evaluate(const double* points, const double* targets, Regularisation r, std::int64_t free,
                          double* gradient, int threads) {
         assembly_.evaluate(free, gradient, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-            parts_[item] = look_at(points, sizes, r, begin, end);
+            parts_[item] = look_at(points, targets, r, begin, end);
         });
         EnergyValue total;
         for (const auto& part : parts_) {
@@ -61,21 +61,17 @@ class Foldover {
     }
 
    private:
-    // Squared edge of the regular simplex of determinant 1.
-    static double unit_edge2() { return D == 2 ? 2.0 / std::sqrt(3.0) : std::cbrt(2.0); }
-
     // The energy of some simplices; what they add to the gradient goes to the shares of their item.
-    EnergyValue look_at(const double* points, const double* sizes, Regularisation r, std::int64_t begin,
+    EnergyValue look_at(const double* points, const double* targets, Regularisation r, std::int64_t begin,
                         std::int64_t end) {
         LaneSum energy, of_inverted;
         double min_det = INFINITY;
         for (std::int64_t s = begin; s < end; s += LANES) {
             const Edges<D, Pack> e = assembly_.edges(points, s, end);
-            Pack size;
-            for (int i = 0; i < LANES; ++i) size[i] = sizes[std::min(s + i, end - 1)];
+            const Target target(targets, s, end);
             Corners<D, Pack> slopes;
             Pack det;
-            Pack value = energy_of(e, size, r, slopes, det);
+            Pack value = energy_of(e, target, r, slopes, det);
             const int count = static_cast<int>(std::min<std::int64_t>(LANES, end - s));
             assembly_.add(slopes, s, count);
             for (int i = 0; i < count; ++i)
@@ -89,25 +85,19 @@ class Foldover {
     }
 
     // The energy, the determinant of J and the slope of the energy at every corner.
-    static Pack energy_of(const Edges<D, Pack>& e, Pack size, Regularisation r, Corners<D, Pack>& slopes, Pack& det) {
-        const Pack one = constant<Pack>(1.0), weight = constant<Pack>(r.weight), to_size = one / size;
-        const Pack to_trace = constant<Pack>(2.0 / ((D + 1) * unit_edge2())) * to_size * to_size;
-        Pack to_det = to_size * to_size;
-        if constexpr (D == 3) to_det = to_det * to_size;
+    static Pack energy_of(const Edges<D, Pack>& e, const Target& target, Regularisation r, Corners<D, Pack>& slopes,
+                          Pack& det) {
+        const Pack one = constant<Pack>(1.0), weight = constant<Pack>(r.weight), to_det = target.to_det();
         det = determinant(e) * to_det;
         const Chi<Pack> chi(det, r.eps);
         const Pack root = D == 2 ? chi.inverse : cube_root(chi.inverse);
-        const Pack by_edges2 = to_trace * (D == 2 ? root : root * root);
-        const Pack shape = by_edges2 * sum_of_squared_edges<D>(e), measure = (one + det * det) * chi.inverse;
+        const Pack shape = target.trace(e, D == 2 ? root : root * root, slopes);
+        const Pack measure = (one + det * det) * chi.inverse;
         const Pack by_det = to_det * (weight * (constant<Pack>(2.0) * det * chi.inverse - measure * chi.decay) -
                                       constant<Pack>(2.0 / D) * shape * chi.decay);
         const Edges<D, Pack> normals = determinant_slopes(e);
-        const Pack pull = constant<Pack>(2.0) * by_edges2;
-        Vec<D, Pack> middle = e[0];
-        for (int k = 1; k < D; ++k) middle = middle + e[k];
-        slopes[0] = Vec<D, Pack>{} - pull * middle;
         for (int k = 0; k < D; ++k) {
-            slopes[k + 1] = pull * (constant<Pack>(D + 1) * e[k] - middle) + by_det * normals[k];
+            slopes[k + 1] = slopes[k + 1] + by_det * normals[k];
             slopes[0] = slopes[0] - by_det * normals[k];
         }
         return shape + weight * measure;

@@ -5,6 +5,8 @@
 // then the variables are the positions, and to the energy comes
 //
 //     pull * sum over free vertices of  max(0, |x - centre| / (FOLDOVER_INNER radius) - 1)^2.
+//
+// Where targets differ much, each vertex has a unit of its own, in which the energy is about as stiff as for any other.
 #pragma once
 
 #include <numeric>
@@ -16,14 +18,14 @@
 
 namespace meshfix {
 
-// What a region is given as, in model units: points (n, D), the `free` ones first; simplices (m, D+1) and their sizes
-// (m); a ball for each free vertex; an infinite radius: none. Where vertices are `drawn`, they may be outside.
+// What a region is given as, in model units: points (n, D), the `free` ones first; simplices (m, D+1) and the numbers of
+// their targets; a ball for each free vertex; an infinite radius: none. Where vertices are `drawn`, they may be outside.
 template <int D>
 struct FoldoverRegion {
     const double* points;
     std::int64_t n;
     const std::int32_t* simplices;
-    const double* sizes;
+    const double* targets;
     std::int64_t m;
     const double* centres;
     std::int64_t free;
@@ -31,13 +33,14 @@ struct FoldoverRegion {
     bool drawn;
 };
 
-template <int D>
+template <int D, class Target>
 class FoldoverProblem {
  public:
     static constexpr int DIMENSION = D;
     Regularisation regularisation{1.0, 1.0};
     double gain = 0.0;  // share of the energy of the inverted simplices by which an iteration must lower it, to go on
     double pull = 0.0;  // with which vertices are drawn into their balls
+    bool until_valid = true;  // whether the first valid points are enough
 
     FoldoverProblem(const FoldoverRegion<D>& region, int threads)
         : energy_(region.simplices, region.m, region.n),
@@ -45,13 +48,14 @@ class FoldoverProblem {
           threads_(threads),
           points_(region.points, region.points + region.n * D),
           local_(region.n * D),
-          sizes_(region.sizes, region.sizes + region.m),
+          targets_(region.targets, region.targets + region.m * Target::NUMBERS),
           centres_(region.centres, region.centres + region.free * D),
           reach_(region.radius),
           drawn_(region.drawn),
           parts_(region.free / PER_ITEM + 1) {
-        for (double size : sizes_) unit_ += size / static_cast<double>(region.m);
-        for (double& size : sizes_) size /= unit_;
+        for (std::int64_t s = 0; s < region.m; ++s) unit_ += Target::size(target(s)) / static_cast<double>(region.m);
+        for (std::int64_t s = 0; s < region.m; ++s) Target::divide(target(s), unit_);
+        if constexpr (Target::SCALED) find_scales();
         for (std::int64_t i = 0; i < region.n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(region.n);
         for (std::int64_t v = 0; v < region.n; ++v) save(to_local(load<D>(points_.data() + v * D)), local_.data(), v);
         radius_ = reach_ / unit_;
@@ -69,21 +73,23 @@ class FoldoverProblem {
                 x = drawn * x;
                 x = (1.0 / std::sqrt(1.0 - norm2(x))) * x;
             }
+            if constexpr (Target::SCALED) x = (1.0 / scales_[v]) * x;
             save(x, u.data(), v);
         });
         return u;
     }
 
     double operator()(const double* u, double* gradient) {
-        for_each_free([&](std::int64_t v) { save(position(v, load<D>(u + v * D)), local_.data(), v); });
-        last_ = energy_.evaluate(local_.data(), sizes_.data(), regularisation, free_, gradient, threads_);
+        for_each_free([&](std::int64_t v) { save(position(v, variable(u, v)), local_.data(), v); });
+        last_ = energy_.evaluate(local_.data(), targets_.data(), regularisation, free_, gradient, threads_);
         if (bound()) {
-            for_each_free([&](std::int64_t v) {
-                save(pulled_back(load<D>(u + v * D), load<D>(gradient + v * D)), gradient, v);
-            });
+            for_each_free(
+                [&](std::int64_t v) { save(pulled_back(variable(u, v), load<D>(gradient + v * D)), gradient, v); });
         }
         if (drawn_) last_.energy += draw(gradient);
-        valid_ = last_.min_det > 0.0 && is_valid();
+        if constexpr (Target::SCALED)
+            for_each_free([&](std::int64_t v) { save(scales_[v] * load<D>(gradient + v * D), gradient, v); });
+        valid_ = until_valid && last_.min_det > 0.0 && is_valid();
         ++evaluations_;
         return last_.energy;
     }
@@ -100,6 +106,22 @@ class FoldoverProblem {
     }
 
  private:
+    double* target(std::int64_t s) { return targets_.data() + s * Target::NUMBERS; }
+
+    void find_scales() {
+        std::vector<double> stiffness(free_, 0.0);
+        const auto& corners = energy_.simplices();
+        for (std::size_t i = 0; i < corners.size(); ++i)
+            if (corners[i] < free_) stiffness[corners[i]] += Target::stiffness(target(i / (D + 1)), i % (D + 1));
+        for (double each : stiffness) scales_.push_back(1.0 / std::sqrt(each));
+    }
+
+    // The vertex's variable without its unit.
+    Vec<D> variable(const double* u, std::int64_t v) const {
+        if constexpr (Target::SCALED) return scales_[v] * load<D>(u + v * D);
+        return load<D>(u + v * D);
+    }
+
     void place() {
         for_each_free([&](std::int64_t v) {
             Vec<D> x = load<D>(local_.data() + v * D);
@@ -162,10 +184,10 @@ class FoldoverProblem {
         return (!drawn_ || is_inside()) && check<D>(points_.data(), energy_.simplices().data(), energy_.size(), threads_).inverted.empty();
     }
 
-    Foldover<D> energy_;
+    Foldover<D, Target> energy_;
     std::int64_t free_, evaluations_ = 0;
     int threads_;
-    std::vector<double> points_, local_, sizes_, centres_;
+    std::vector<double> points_, local_, targets_, centres_, scales_;
     double reach_, unit_ = 0.0, radius_ = INFINITY;
     bool drawn_;
     std::vector<double> parts_;  // of what draws, for each item

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -54,6 +54,21 @@ class Held:
             source, self.fix, self.regions, double=double, fix_orientation=fix_orientation,
             join_points=self.join_points, form=self.input_format, threads=threads,
         )  # fmt: skip
+
+    def read_reference(self, source: str, document: Document, threads: int) -> NDArray[np.float64]:
+        """Read where the vertices of a mesh were before its boundary moved, (k, d) as `untangle.steps` takes them.
+
+        Raises
+        ------
+        ReadError, InvalidMeshError
+            Also where the elements are others.
+        """
+        from meshfix_cli.errors import naming
+        from meshfix_cli.mesh.reference import reference_points
+
+        mesh = replace(self, fix=None, regions=None, input_format=None).read(source, threads).mesh
+        with naming(f"{source}: as a reference"):
+            return reference_points(document.mesh, mesh, threads)
 
 
 @dataclass(frozen=True)
@@ -140,24 +155,33 @@ class Method:
         threads: int,
         hopeless: NDArray[np.bool_] | None = None,
         team: Team | None = None,
+        reference: NDArray[np.float64] | None = None,
     ) -> Steps:
         """Run the phases, see `untangle.steps`."""
         from meshfix_cli.solve.untangle import steps
 
-        phases = plan(self.strategy, self.smooth, self.only_invalid)
+        phases = plan(self.strategy, self.smooth, self.only_invalid, reference is not None)
         return steps(
             mesh, phases, sweeps=self.sweeps, threshold=self.threshold, max_move=reach, only_invalid=self.only_invalid,
-            hopeless=hopeless, threads=threads, team=team,
+            hopeless=hopeless, reference=reference, threads=threads, team=team,
         )  # fmt: skip
 
-    def solve(self, mesh: Mesh, reach: float, threads: int, watch: Callable[[Steps], Steps] = iter) -> Outcome:
+    def solve(
+        self,
+        mesh: Mesh,
+        reach: float,
+        threads: int,
+        watch: Callable[[Steps], Steps] = iter,
+        reference: NDArray[np.float64] | None = None,
+    ) -> Outcome:
         """Run them to the end; `watch` passes the steps through, to show them."""
         from meshfix_cli.quality.obstacles import find_obstacles
         from meshfix_cli.solve.records import Outcome
         from meshfix_cli.solve.untangle import drain
 
         obstacles = find_obstacles(mesh, threads)
-        return Outcome(*drain(watch(self.steps(mesh, reach, threads, obstacles.hopeless(mesh)))), obstacles)
+        run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
+        return Outcome(*drain(watch(run)), obstacles)
 
 
 @dataclass(frozen=True)
@@ -186,6 +210,7 @@ class Judge:
         stages: Mapping[str, Mesh],
         notes: tuple[str, ...] = (),
         obstacles: Obstacles | None = None,
+        reference: NDArray[np.float64] | None = None,
         **more: Any,
     ) -> Report:
         """Summarise the stages of a mesh, of which the last is the result."""
@@ -203,7 +228,7 @@ class Judge:
             meshes=dict(stages),
             points=partial(document.file_points, result),
             ids=document.ids,
-            stages={stage: summarise(stages[stage], metrics, self.threads) for stage in shown},
+            stages={stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown},
             ceiling=None if self.brief else ceiling(result, self.threads),
             obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
             fixed=document.fixed,
@@ -222,6 +247,7 @@ def repair(
     judge: Judge,
     solve: Callable[[Mesh, float], Outcome] | None = None,
     put: Put | None = None,
+    reference: NDArray[np.float64] | None = None,
 ) -> Report:
     """Untangle and smooth a mesh, write it and report.
 
@@ -236,6 +262,8 @@ def repair(
         (mesh, how far vertices may move in model units) -> Outcome; default: `method.solve`.
     put : callable
         See `writing.write`.
+    reference : (k, d) float64
+        Gives elements their shapes, see `untangle.steps`; whoever solves must know it too.
 
     Raises
     ------
@@ -250,24 +278,30 @@ def repair(
     meshes = outcome.after, outcome.untangled, outcome.before
     after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
     result, written = files.write(document, after, output, put)
-    notes = (*_what_happened(document, method, outcome, after, rounded), *written)
+    asked = method.smooth and not method.only_invalid and reference is None
+    notes = (*_what_happened(document, bool(asked), outcome, after, rounded), *written)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
     facts: dict[str, Any] = {"strategy": method.strategy, "displacement": displacement(outcome.before, result)}
     if outcome.ranks:
         facts["ranks"] = [asdict(rank) for rank in outcome.ranks]
     if method.max_move is not None:
         facts["max_move"] = reach
-    return judge.report("untangle", document, stages, notes, outcome.obstacles, records=outcome.records, facts=facts)
+    return judge.report(
+        "untangle", document, stages, notes, outcome.obstacles, reference, records=outcome.records, facts=facts
+    )
 
 
-def _what_happened(document: Document, method: Method, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
-    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded."""
+def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
+    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded.
+
+    `asked`: better angles were asked for.
+    """
     nothing = "no element that is judged" if document.not_judged else "no element"
     if outcome.after is outcome.before and outcome.valid:
         if len(outcome.records) > 1:
             return (f"{nothing} is inverted and no angle could be made better: nothing was moved",)
-        asked = " and no angle is below what --threshold asks for" * bool(method.smooth and not method.only_invalid)
-        return (f"{nothing} is inverted{asked}: nothing was moved",)
+        angles = " and no angle is below what --threshold asks for" * asked
+        return (f"{nothing} is inverted{angles}: nothing was moved",)
     if outcome.records[-1].inverted or not rounded:
         return ()
     kind = document.source.points.dtype.name

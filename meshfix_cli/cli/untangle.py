@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.files import open_files, report_stream, write_cells
-from meshfix_cli.cli.names import HISTORY
+from meshfix_cli.cli.names import FILE, HISTORY
 from meshfix_cli.cli.options import (
     Draw,
     Show,
@@ -35,6 +35,12 @@ if TYPE_CHECKING:
 @click.command(short_help="Move interior vertices until no element is inverted.")
 @writing
 @solving
+@click.option(
+    "--reference",
+    type=FILE,
+    metavar="FILE",
+    help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in it.",
+)
 @click.option("--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells
 @drawing
@@ -49,6 +55,7 @@ def untangle(
     held: Held,
     show: Show,
     method: Method,
+    reference: str | None,
     history: str | None,
     cells: str | None,
     draw: Draw,
@@ -70,6 +77,8 @@ def untangle(
 
     if verbose and show.quiet:
         raise click.UsageError("--quiet and --verbose exclude each other")
+    if reference is not None:
+        _check_reference(reference, method, mpi)
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
         click.get_current_context().params["threads"] = 1
@@ -82,10 +91,10 @@ def untangle(
         document, output = open_files(files, held, show.threads, history, cells, *draw.names)
         if cells is not None:
             check_cells(document, cells)
-        solve, put = (
-            (root.solve, root.put) if root else (partial(method.solve, threads=show.threads, watch=watch), None)
-        )
-        report = repair(document, output, files, method, show.judge(draw, requirements), solve, put)
+        before = None if reference is None else held.read_reference(reference, document, show.threads)
+        alone = partial(method.solve, threads=show.threads, watch=watch, reference=before)
+        solve, put = (root.solve, root.put) if root else (alone, None)
+        report = repair(document, output, files, method, show.judge(draw, requirements), solve, put, before)
         if history is not None:
             write_text(history, history_csv(report.records))
         if cells is not None:
@@ -93,3 +102,12 @@ def untangle(
         draw.write(report, show.threads)
         show.print(report, report_stream(files))
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
+
+
+def _check_reference(reference: str, method: Method, mpi: bool) -> None:
+    """Refuse what makes no sense with a reference."""
+    if reference == "-":
+        raise click.UsageError("--reference is a file: stdin is INPUT's")
+    others = {"--mpi": mpi, "--only-invalid": method.only_invalid, "--threshold": method.threshold is not None}
+    for other in (name for name, given in others.items() if given):
+        raise click.UsageError(f"--reference and {other} exclude each other")

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.formulas import worst_and_mean
+from meshfix_cli.quality.relative import worst_and_mean_to
 
 Array = NDArray[np.float64]
 BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
@@ -24,7 +25,8 @@ BINS = {2: 12, 3: 15}
 class Summary:
     """Quality of a mesh; angles in degrees (dihedral for tetrahedra), measures in model units.
 
-    Angles are those of the shape, without sign; `inverted` counts the elements that are not valid.
+    Angles are those of the shape, without sign; `inverted` counts the elements that are not valid. Where there is a
+    reference, `to_reference` are the smallest and the mean of `relative.mean_ratio_to`.
     """
 
     elements: int
@@ -38,9 +40,10 @@ class Summary:
     histogram: tuple[int, ...]
     metrics: dict[str, tuple[float, float]]
     inverted_elements: NDArray[np.int32]
+    to_reference: tuple[float, float] | None = None
 
 
-def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summary:
+def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, reference: Array | None = None) -> Summary:
     """Evaluate a mesh.
 
     Parameters
@@ -49,6 +52,8 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summ
     metrics : sequence of str
         Keys of `METRICS`; the summary holds the worst and the mean value of each.
     threads : int
+    reference : (k, d) float64, optional
+        Where the vertices, in the order of the connectivity, were before the boundary moved.
 
     Returns
     -------
@@ -72,6 +77,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1) -> Summ
         histogram=tuple(histogram.tolist()),
         metrics={name: worst_and_mean(name, mesh) for name in metrics},
         inverted_elements=np.sort(connectivity.rows[inverted]),
+        to_reference=None if reference is None else worst_and_mean_to(mesh, reference),
     )
 
 

@@ -69,7 +69,7 @@ def history_csv(records: Iterable[SweepRecord]) -> str:
 
 
 def _summary_json(summary: Summary) -> dict[str, Any]:
-    values = {
+    values: dict[str, Any] = {
         "inverted": summary.inverted,
         "folded": summary.folded,
         "min_measure": summary.min_measure,
@@ -79,6 +79,8 @@ def _summary_json(summary: Summary) -> dict[str, Any]:
         "percentile_1": summary.percentile_1,
         "histogram": {"bin_width": BIN_WIDTH, "counts": list(summary.histogram)},
     }
+    if summary.to_reference is not None:
+        values["to_reference"] = dict(zip(("smallest", "mean"), summary.to_reference, strict=True))
     finite = {name: [_finite(v) for v in pair] for name, pair in summary.metrics.items()}
     return {**values, "metrics": {name: {"worst": w, "mean": m} for name, (w, m) in finite.items()}}
 

@@ -185,6 +185,10 @@ def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
     ]
     if report.ceiling is not None:
         rows.append(("ceiling set by fixed vertices [°]", [""] * (len(stages) - 1) + [f"{report.ceiling:.3f}"]))
+    if report.result.to_reference is not None:
+        pairs = (summary.to_reference for summary in stages)
+        worst = ["{:.3f} / {:.3f}".format(*pair) for pair in pairs if pair is not None]
+        rows.append(("mean ratio to the reference, worst / mean", worst))
     for name in report.result.metrics:
         worst = [f"{summary.metrics[name][0]:.3g} / {summary.metrics[name][1]:.3g}" for summary in stages]
         rows.append((f"{name}, worst / mean", worst))

@@ -119,6 +119,37 @@ def drawn_into_reach(
             return
 
 
+def minimisations_to(
+    points: Array,
+    mesh: kernels.Connectivity,
+    free: NDArray[np.bool_],
+    inverses: Array,
+    reach: Reach,
+    threads: int,
+    until_valid: bool = True,
+) -> Iterator[Array]:
+    """Yield the points (n, d) after each minimisation, with a target of its own shape for each simplex.
+
+    Parameters
+    ----------
+    points, mesh, free, reach, threads
+        See `minimisations`.
+    inverses : (m, d, d) float64
+        Of the matrices whose columns are the edges that lead from the first vertex of each target.
+    until_valid : bool
+        End where all simplices of the region are valid. Otherwise the points are valid already, and stay so: each
+        minimisation goes on from the last.
+    """
+    if not (free.any() and reach.distance > 0):
+        return
+    region = _Region(mesh, free, reach, threads)
+    targets = np.ascontiguousarray(inverses[region.rows])
+    if until_valid:
+        yield from (moved for effort in (QUICK, THOROUGH) for moved in region.minimise(points, targets, effort))
+    else:
+        yield from region.approach(points, targets)
+
+
 def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int = 1) -> Array:
     """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
 
@@ -150,7 +181,7 @@ class _Region(Region):
         return _of_determinants(np.full(len(measure), size), points.shape[1])
 
     def sizes(self, points: Array) -> Array:
-        """Return targets (s,) of the sizes that the simplices have at positions (n, d), none much smaller than others."""
+        """Return targets (s,) of the sizes that the simplices have at positions (n, d), none much smaller than most."""
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         sizes = np.abs(measure) ** (1 / points.shape[1])
         sizes = np.maximum(sizes, max(SMALLEST_TARGET * np.median(sizes), np.finfo(float).tiny))
@@ -184,6 +215,16 @@ class _Region(Region):
     def is_valid(self, points: Array) -> bool:
         """Whether no simplex of the region is inverted."""
         return len(kernels.check(points, self.global_simplices, self.threads)[0]) == 0
+
+    def approach(self, start: Array, targets: Array) -> Iterator[Array]:
+        """Yield valid points after each minimisation from valid ones; that a simplex is inverted costs too much."""
+        problem = self._problem(start, targets)
+        while True:
+            before, after = problem.minimise(LAST_EPS, WEIGHT, ITERATIONS, 0.0, until_valid=False)
+            points = self._moved(start, problem)
+            if not (after < before and self.is_valid(points)):
+                return
+            yield points
 
     def _problem(self, start: Array, targets: Array, drawn: bool = False) -> kernels.Foldover:
         """Make the energy of targets (s,), or of the inverse matrices (s, d, d) of those."""

@@ -69,6 +69,7 @@ class Run:
         hopeless: NDArray[np.bool_] | None,
         threads: int,
         team: Team,
+        reference: NDArray[np.float64] | None = None,
     ) -> None:
         self.clock = time.perf_counter()
         self.threshold = math.asin(math.sqrt(threshold_sine2))
@@ -97,6 +98,7 @@ class Run:
         self.only_invalid = only_invalid
         self.broken = self._broken()
         self.near = self.free & self.broken if only_invalid else self.free
+        self.reference = reference
         self.rival: _Start | None = None
         self.kept: tuple[NDArray[np.float64], SweepRecord, float] | None = None
         self.lost = False  # what the last minimisation of the shape began with
@@ -132,6 +134,8 @@ class Run:
     def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         """Yield the points (k, d) after each sweep; the caller adds them before it asks for the next."""
         self.changed[:] = False
+        if phase.to_reference:
+            return self._towards_reference(phase)
         if phase.embeds:
             return self._another_start()
         if phase.shapes:
@@ -384,6 +388,15 @@ class Run:
 
     def _least(self, angles: NDArray[np.float64]) -> float:
         return self.team.least(float(angles.min(initial=math.pi)))
+
+    def _towards_reference(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+        from meshfix_cli.solve import towards
+
+        assert self.reference is not None
+        if phase.smooths and self.left:
+            return iter(())
+        compute = partial(getattr(towards, phase.to_reference), self.max_move, self.threads)
+        return self.team.of_whole(compute, self.points, self.first[0], self.reference, self.free)
 
     def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         compute = partial(_minimisations, phase.rings, self.max_move, self.threads)

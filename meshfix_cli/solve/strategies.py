@@ -72,6 +72,8 @@ class Phase:
     shapes : {"first", "lost", "risen"}, optional
         One minimisation of the shape of all elements at once, from a valid mesh. "lost": from where the last one began,
         if the smallest angle is smaller than there, with that held; "risen": if it has risen since the last one began.
+    to_reference : str
+        Of phases without moves, the function of `towards.py` that gives the points after each sweep.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Phase:
     rings: tuple[int | None, ...] = ()
     embeds: bool = False
     shapes: Literal["first", "lost", "risen"] | None = None
+    to_reference: Literal["", "follow", "mend", "approach"] = ""
 
     @property
     def smooths(self) -> bool:
@@ -121,6 +124,11 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "FF": (_FOLDOVER,),
 }
 
+# Where there is a reference: elements should have the shapes that they had; the strategy only mends what is left.
+_FOLLOW = Phase("following the boundary", max_sweeps=1, to_reference="follow")
+_TO_REFERENCE = Phase("FF towards the reference", max_sweeps=100, to_reference="mend")
+_APPROACH = Phase(f"{SMOOTHING} towards the reference", until="settled", from_best=True, to_reference="approach")
+
 # After three passes, where they do not suffice.
 _MORE = Phase(
     f"{SMOOTHING} the rest", (*(Move.MEAN_RATIO,) * 2, *(Move.COMBINED_SMOOTH,) * 2), MORE_SWEEPS,
@@ -135,7 +143,9 @@ _HELD = replace(_SHAPE, name=f"{SMOOTHING} all at once, the worst held", shapes=
 _BEST = (_SHAPE, _RAISE, _HELD, _RAISE, *(replace(_HELD, shapes="risen"), _RAISE) * ROUNDS)
 
 
-def plan(strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False) -> tuple[Phase, ...]:
+def plan(
+    strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False, to_reference: bool = False
+) -> tuple[Phase, ...]:
     """Return the phases of a strategy and those of smoothing.
 
     With `only_invalid` the region of sweeps that stall grows; where nothing is smoothed, vertices that went farther
@@ -146,12 +156,18 @@ def plan(strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False) -> 
     strategy : str
     smooth : int, "auto" or "best"
         So many passes; "auto": `PASSES`, and more where they leave angles below the threshold; "best": what can be had.
+    only_invalid : bool
+        See `untangle.steps`.
+    to_reference : bool
+        Elements should have the shapes of a reference. A pass of smoothing is a minimisation then.
 
     Raises
     ------
     ValueError
-        There is no such strategy, or no such smoothing.
+        There is no such strategy, or no such smoothing; or with a reference only invalid elements should move.
     """
+    if only_invalid and to_reference:
+        raise ValueError("with a reference all elements get their shapes back, not only those that are invalid")
     if smooth not in ("auto", "best") and not (isinstance(smooth, int) and 0 <= smooth <= MOST_PASSES):
         raise ValueError(f'smooth is {smooth!r}, and must be a number of passes, "auto" or "best"')
     if strategy not in STRATEGIES:
@@ -159,6 +175,9 @@ def plan(strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False) -> 
     untangling = STRATEGIES[strategy]
     if only_invalid:
         untangling = tuple(region for phase in untangling for region in _in_regions(phase))
+    if to_reference:
+        most = smooth if isinstance(smooth, int) else PASSES if smooth == "auto" else MORE_SWEEPS
+        return (_FOLLOW, _TO_REFERENCE, *untangling, replace(_APPROACH, max_sweeps=most))
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), PASSES, until="settled", from_best=True)
     if only_invalid and smooth == 0:
         return (*untangling, _BACK)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.mesh.reference import reference_points
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.solve.records import Outcome, SweepRecord
 from meshfix_cli.solve.run import Run
@@ -33,13 +34,14 @@ def steps(
     max_move: float = math.inf,
     only_invalid: bool = False,
     hopeless: NDArray[np.bool_] | None = None,
+    reference: NDArray[np.float64] | None = None,
     threads: int = 1,
     team: Team | None = None,
 ) -> Iterator[tuple[Mesh, SweepRecord]]:
     """Run the phases; yield the mesh and a record as it came and after each sweep.
 
     A valid mesh without an angle below the threshold, but for simplices without a free vertex, is left alone, unless a
-    phase goes up to the ceiling.
+    phase goes up to the ceiling, and any valid mesh where there is a reference.
 
     A phase that starts from the best mesh where that is not the last one begins with a record of phase "best";
     smoothing does. The last mesh is never worse than the first, by (inverted elements, smallest measure); where phases
@@ -58,6 +60,8 @@ def steps(
     hopeless : (m,) bool, optional
         Simplices, in the order of the connectivity, that may be inverted for good: see `Obstacles.hopeless`. Sweeps
         try to mend them, but the energy is not minimised for them.
+    reference : (k, d) float64, optional
+        Where the vertices, in the order of the connectivity, were before the boundary moved; see `towards.py`.
     threads : int
     team : Team, optional
         The processes of which each has a part of the mesh; the meshes are parts, the records are of the whole.
@@ -70,11 +74,12 @@ def steps(
     if not (0 <= degrees <= 90 and max_move >= 0):
         raise ValueError("the threshold must be from 0 to 90 degrees, and max_move not negative")
     team = Alone(mesh, threads) if team is None else team
-    run = Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, hopeless, threads, team)
+    run = Run(mesh, math.sin(math.radians(degrees)) ** 2, max_move, only_invalid, hopeless, threads, team, reference)
     yield run.mesh, run.record
     phases = tuple(phases)
     to_the_ceiling = any(phase.until == "ceiling" for phase in phases)
-    if run.record.inverted == 0 and (only_invalid or (not to_the_ceiling and run.meets(degrees))):
+    as_it_is = only_invalid or reference is not None
+    if run.record.inverted == 0 and (as_it_is or (not to_the_ceiling and run.meets(degrees))):
         return
     for phase in phases:
         untangling = not phase.smooths
@@ -132,6 +137,7 @@ def untangle(
     threshold: float | None = None,
     max_move: float = math.inf,
     only_invalid: bool = False,
+    reference: Mesh | None = None,
     threads: int = 1,
 ) -> Outcome:
     """Move interior vertices until no element is inverted, then improve the worst angles.
@@ -148,6 +154,8 @@ def untangle(
         no more.
     sweeps, threshold, max_move, only_invalid
         See `steps`.
+    reference : Mesh, optional
+        The same mesh before its boundary moved: elements should have the shapes that they have in it.
     threads : int
         The result has the same bits for any number.
 
@@ -160,6 +168,8 @@ def untangle(
     ------
     ValueError
         There is no such strategy, or an argument is out of range.
+    InvalidMeshError
+        The reference has other elements; see `reference_points`.
 
     Notes
     -----
@@ -168,9 +178,11 @@ def untangle(
     some, the graph's embedding is a second start, and the better one is kept. Both are first tried near the inverted
     elements, where these are few; FF follows, first in the smallest region that can be solved.
     """
-    phases, obstacles = plan(strategy, smooth, only_invalid), find_obstacles(mesh, threads)
+    phases = plan(strategy, smooth, only_invalid, reference is not None)
+    places = None if reference is None else reference_points(mesh, reference, threads)
+    obstacles = find_obstacles(mesh, threads)
     run = steps(
         mesh, phases, sweeps=sweeps, threshold=threshold, max_move=max_move, only_invalid=only_invalid,
-        hopeless=obstacles.hopeless(mesh), threads=threads,
+        hopeless=obstacles.hopeless(mesh), reference=places, threads=threads,
     )  # fmt: skip
     return Outcome(*drain(run), obstacles)

@@ -7,9 +7,11 @@ import re
 import subprocess
 from pathlib import Path
 
+import meshio
 import pytest
 from click.testing import CliRunner
 from commands import MESHFIX, TANGLED, VALID, error_line, run
+from places import SAMPLES
 
 from meshfix_cli.cli import main
 from meshfix_cli.quality.metrics import METRICS, NUMBERS
@@ -45,6 +47,46 @@ def test_no_summary_of_a_command_is_cut_short() -> None:
     listed = CliRunner().invoke(main, ["--help"]).output.partition("Commands:\n")[2].splitlines()
     assert len(listed) == len(main.commands)  # one line each
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
+
+
+def test_a_reference_gives_elements_their_shapes_back(tmp_path: Path) -> None:
+    """In any format that is read; the report tells by how much, and nobody else's does."""
+    converted, out = tmp_path / "before.vtu", tmp_path / "o.vtk"
+    meshio.read(VALID).write(converted)
+    facts = json.loads(run("untangle", "--json", "--reference", converted, TANGLED, out).stdout)
+    ratios = {stage: summary["to_reference"] for stage, summary in facts["quality"].items()}
+    assert ratios["before"]["smallest"] == 0.0
+    assert ratios["smoothed"] == {"smallest": pytest.approx(1.0), "mean": pytest.approx(1.0)}
+    assert facts["sweeps"][1]["phase"] == "following the boundary"
+    table = run("untangle", "--reference", VALID, TANGLED, out).stdout.decode()
+    row = next(line for line in table.splitlines() if "mean ratio to the reference" in line)
+    assert re.findall(r"[\d.]+ / [\d.]+", row) == ["0.000 / 0.545", "1.000 / 1.000", "1.000 / 1.000"]
+    assert meshio.read(out).points == pytest.approx(meshio.read(VALID).points, abs=1e-12)
+    assert "to_reference" not in run("untangle", "--json", TANGLED, out).stdout.decode()
+    again = run("untangle", "--reference", VALID, VALID, out).stdout.decode()
+    assert "note: no element is inverted: nothing was moved" in again
+
+
+def test_what_is_no_reference_is_refused_in_one_line(tmp_path: Path) -> None:
+    out, bracket = tmp_path / "o.vtk", str(SAMPLES / "bracket.vtk")
+    said = error_line("untangle", "--reference", bracket, TANGLED, out, code=1)
+    assert said.endswith(
+        "as a reference: it has 1,863 points and 7,968 tetrahedra, and the mesh 207 points and 332 triangles"
+    )
+    assert error_line("untangle", "--reference", TANGLED, TANGLED, out, code=1).endswith(
+        "89 triangles of it are inverted"
+    )
+    assert error_line("untangle", "--reference", tmp_path / "no.vtk", TANGLED, out, code=1).endswith(
+        "No such file or directory"
+    )
+    for more in (["--mpi"], ["--only-invalid"], ["--threshold", "20"]):
+        said = error_line("untangle", "--reference", VALID, *more, TANGLED, out, code=2)
+        assert said == f"Error: --reference and {more[0]} exclude each other"
+    assert (
+        error_line("untangle", "--reference", "-", TANGLED, out, code=2)
+        == "Error: --reference is a file: stdin is INPUT's"
+    )
+    assert not out.exists()
 
 
 def test_the_numbers_of_the_result_are_at_the_top_of_the_json() -> None:

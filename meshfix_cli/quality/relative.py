@@ -1,0 +1,39 @@
+"""Quality by the shapes that the elements have in a reference, instead of the regular one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.mesh import Mesh
+
+
+def mean_ratio_to(mesh: Mesh, reference: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the mean ratio of each simplex as if that of the reference were the regular one.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    reference : (k, d) float64
+        Positions of the vertices, in the order of the connectivity.
+
+    Returns
+    -------
+    (m,) float64
+        In the order of the connectivity: d det(T)^(2/d) / |T|^2, T = A W^-1 with the edges A and those of the
+        reference W: 1 where only position and size differ, 0 where the simplex is inverted. Source: P. Knupp,
+        "Algebraic mesh quality metrics", SIAM Journal on Scientific Computing 23 (2001).
+    """
+    simplices, d = mesh.topology.connectivity.simplices, mesh.dimension
+    here, there = (points[simplices] for points in (mesh.along_curve(mesh.points), reference))
+    maps = np.linalg.solve(there[:, 1:] - there[:, :1], here[:, 1:] - here[:, :1])  # the transpose of T
+    mirrored = np.sign(np.linalg.det(there[:, 1:] - there[:, :1]))  # where a whole part is
+    det = np.maximum(np.linalg.det(maps) * mirrored, 0.0)
+    square = (maps**2).sum(axis=(1, 2))
+    return np.divide(d * det ** (2 / d), square, out=np.zeros_like(det), where=square > 0)
+
+
+def worst_and_mean_to(mesh: Mesh, reference: NDArray[np.float64]) -> tuple[float, float]:
+    """Return the smallest and the mean of `mean_ratio_to`."""
+    values = mean_ratio_to(mesh, reference)
+    return float(values.min()), float(values.mean())

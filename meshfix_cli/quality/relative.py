@@ -7,25 +7,25 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.mesh import Mesh
 
+Array = NDArray[np.float64]
 
-def mean_ratio_to(mesh: Mesh, reference: NDArray[np.float64]) -> NDArray[np.float64]:
+
+def mean_ratios(points: Array, reference: Array, simplices: NDArray[np.int32]) -> Array:
     """Return the mean ratio of each simplex as if that of the reference were the regular one.
 
     Parameters
     ----------
-    mesh : Mesh
-    reference : (k, d) float64
-        Positions of the vertices, in the order of the connectivity.
+    points, reference : (n, d) float64
+    simplices : (m, d+1) int32
 
     Returns
     -------
     (m,) float64
-        In the order of the connectivity: d det(T)^(2/d) / |T|^2, T = A W^-1 with the edges A and those of the
+        d det(T)^(2/d) / |T|^2, T = A W^-1 with the edges A and those of the
         reference W: 1 where only position and size differ, 0 where the simplex is inverted. Source: P. Knupp,
         "Algebraic mesh quality metrics", SIAM Journal on Scientific Computing 23 (2001).
     """
-    simplices, d = mesh.topology.connectivity.simplices, mesh.dimension
-    here, there = (points[simplices] for points in (mesh.along_curve(mesh.points), reference))
+    d, here, there = points.shape[1], points[simplices], reference[simplices]
     maps = np.linalg.solve(there[:, 1:] - there[:, :1], here[:, 1:] - here[:, :1])  # the transpose of T
     mirrored = np.sign(np.linalg.det(there[:, 1:] - there[:, :1]))  # where a whole part is
     det = np.maximum(np.linalg.det(maps) * mirrored, 0.0)
@@ -33,7 +33,7 @@ def mean_ratio_to(mesh: Mesh, reference: NDArray[np.float64]) -> NDArray[np.floa
     return np.divide(d * det ** (2 / d), square, out=np.zeros_like(det), where=square > 0)
 
 
-def worst_and_mean_to(mesh: Mesh, reference: NDArray[np.float64]) -> tuple[float, float]:
-    """Return the smallest and the mean of `mean_ratio_to`."""
-    values = mean_ratio_to(mesh, reference)
+def worst_and_mean_to(mesh: Mesh, reference: Array) -> tuple[float, float]:
+    """Return the smallest and the mean of `mean_ratios`; the reference (k, d) is in the order of the connectivity."""
+    values = mean_ratios(mesh.along_curve(mesh.points), reference, mesh.topology.connectivity.simplices)
     return float(values.min()), float(values.mean())

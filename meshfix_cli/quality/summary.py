@@ -26,7 +26,7 @@ class Summary:
     """Quality of a mesh; angles in degrees (dihedral for tetrahedra), measures in model units.
 
     Angles are those of the shape, without sign; `inverted` counts the elements that are not valid. Where there is a
-    reference, `to_reference` are the smallest and the mean of `relative.mean_ratio_to`.
+    reference, `to_reference` are the smallest and the mean of `relative.mean_ratios`.
     """
 
     elements: int

@@ -23,6 +23,7 @@ WEIGHT = 0.5  # of the measure in the energy: large ones make valid sooner, smal
 MINIMISATIONS = 30  # with one target
 ITERATIONS = 300  # of one minimisation
 SMALLEST_TARGET = 0.05  # of the median: no target of a simplex that the embedding makes flat is smaller
+WITHIN = 1 - 1e-12  # of the distance that vertices may go, whatever is rounded
 LAST_EPS = 1e-10  # where all determinants are positive already
 DRAWING_EPS = 1e-2  # where vertices are drawn into reach
 PULLS = tuple(10 ** (k / 2) for k in range(18))  # on the vertices, one after the other, for each simplex
@@ -62,6 +63,15 @@ class Reach:
 
     start: Array
     distance: float = math.inf
+
+    def drawn_in(self, points: Array) -> Array:
+        """Return points (n, d) with those that are too far drawn straight back."""
+        way = points - self.start
+        length = np.linalg.norm(way, axis=1)
+        far = length > self.distance
+        near = points.copy()
+        near[far] = self.start[far] + (self.distance * WITHIN / length[far])[:, None] * way[far]
+        return near
 
 
 def minimisations(

@@ -40,7 +40,6 @@ GOAL_RINGS = 4  # around the elements below the goal that are smoothed
 GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
 GOAL_PATIENCE = 2
 _Start = tuple[NDArray[np.float64], SweepRecord, tuple[int, float]]
-WITHIN = 1 - 1e-12  # of the distance that vertices may go, whatever is rounded
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
 
 
@@ -98,7 +97,7 @@ class Run:
         self.only_invalid = only_invalid
         self.broken = self._broken()
         self.near = self.free & self.broken if only_invalid else self.free
-        self.reference = reference
+        self.reference, self.targeted = reference, reference is not None
         self.rival: _Start | None = None
         self.kept: tuple[NDArray[np.float64], SweepRecord, float] | None = None
         self.lost = False  # what the last minimisation of the shape began with
@@ -118,6 +117,8 @@ class Run:
     def enter(self, phase: Phase) -> bool:
         """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
         if phase.smooths:
+            if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
+                return False
             return self._goes_on(phase)
         if Move.LAPLACIAN in phase.moves:
             self.hard = False
@@ -172,6 +173,7 @@ class Run:
         sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
         self.record = self._record(phase.name, sweep, self._count(self.changed))
         self.untangling += not phase.smooths
+        self.targeted = self.targeted or (phase.layers and self.left == 0)
         if Move.LAPLACIAN in phase.moves:
             self.hard = self.promising > 0 or (self.many and sweep > EASY)
         now = (self.points, self.record, self._rank())
@@ -390,13 +392,11 @@ class Run:
         return self.team.least(float(angles.min(initial=math.pi)))
 
     def _towards_reference(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
-        from meshfix_cli.solve import towards
+        from meshfix_cli.solve import layers, towards
 
-        assert self.reference is not None
-        if phase.smooths and self.left:
-            return iter(())
-        compute = partial(getattr(towards, phase.to_reference), self.max_move, self.threads)
-        return self.team.of_whole(compute, self.points, self.first[0], self.reference, self.free)
+        compute = partial(getattr(layers if phase.layers else towards, phase.to_reference), self.max_move, self.threads)
+        reference = () if self.reference is None or phase.layers else (self.reference,)
+        return self.team.of_whole(compute, self.points, self.first[0], *reference, self.free)
 
     def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         compute = partial(_minimisations, phase.rings, self.max_move, self.threads)
@@ -412,14 +412,9 @@ def _embedded(
     near: NDArray[np.bool_],
 ) -> Iterator[NDArray[np.float64]]:
     """Yield the points with those near by in the graph's embedding, as far as they may go."""
-    from meshfix_cli.solve.foldover import embedding
+    from meshfix_cli.solve.foldover import Reach, embedding
 
-    embedded = embedding(points, stars, near, threads)
-    way = embedded - start
-    length = np.linalg.norm(way, axis=1)
-    far = length > max_move
-    embedded[far] = start[far] + (max_move * WITHIN / length[far])[:, None] * way[far]
-    yield embedded
+    yield Reach(start, max_move).drawn_in(embedding(points, stars, near, threads))
 
 
 def _minimisations(

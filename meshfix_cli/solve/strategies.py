@@ -73,7 +73,10 @@ class Phase:
         One minimisation of the shape of all elements at once, from a valid mesh. "lost": from where the last one began,
         if the smallest angle is smaller than there, with that held; "risen": if it has risen since the last one began.
     to_reference : str
-        Of phases without moves, the function of `towards.py` that gives the points after each sweep.
+        Of phases without moves, the function of `towards.py` that gives the points after each sweep. Smoothing that
+        has one takes the place of the other, where there is a reference or layers were followed.
+    layers : bool
+        The function is that of `layers.py`, which makes up a reference.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Phase:
     embeds: bool = False
     shapes: Literal["first", "lost", "risen"] | None = None
     to_reference: Literal["", "follow", "mend", "approach"] = ""
+    layers: bool = False
 
     @property
     def smooths(self) -> bool:
@@ -128,6 +132,8 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
 _FOLLOW = Phase("following the boundary", max_sweeps=1, to_reference="follow")
 _TO_REFERENCE = Phase("FF towards the reference", max_sweeps=100, to_reference="mend")
 _APPROACH = Phase(f"{SMOOTHING} towards the reference", until="settled", from_best=True, to_reference="approach")
+_LAYERS = Phase("layers following the wall", max_sweeps=1, to_reference="follow", layers=True)
+_LAYERS_SMOOTHED = Phase(f"{SMOOTHING} the layers", until="settled", to_reference="approach", layers=True)
 
 # After three passes, where they do not suffice.
 _MORE = Phase(
@@ -175,9 +181,11 @@ def plan(
     untangling = STRATEGIES[strategy]
     if only_invalid:
         untangling = tuple(region for phase in untangling for region in _in_regions(phase))
+    most = smooth if isinstance(smooth, int) else PASSES if smooth == "auto" else MORE_SWEEPS
     if to_reference:
-        most = smooth if isinstance(smooth, int) else PASSES if smooth == "auto" else MORE_SWEEPS
         return (_FOLLOW, _TO_REFERENCE, *untangling, replace(_APPROACH, max_sweeps=most))
+    if strategy == "auto" and not only_invalid:
+        untangling = (_LAYERS, *untangling, replace(_LAYERS_SMOOTHED, max_sweeps=most))
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), PASSES, until="settled", from_best=True)
     if only_invalid and smooth == 0:
         return (*untangling, _BACK)

@@ -12,7 +12,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from meshfix_cli import kernels
 from meshfix_cli.solve.foldover import Reach, minimisations_to
@@ -23,7 +22,6 @@ TURNS = 50  # of simplices, at most
 GAIN = 1e-3  # share of the misfit by which a turn must lower it, to go on
 EXACT = 1e-4  # residual of a system, of that at the start, each relative to the diagonal
 STEPS = 1000  # of conjugate gradients, at most
-WITHIN = 1 - 1e-12  # of the distance that vertices may go, whatever is rounded
 
 
 def inverses(reference: Array, simplices: NDArray[np.int32]) -> Array:
@@ -45,12 +43,7 @@ def follow(
 ) -> Iterator[Array]:  # fmt: skip
     """Yield points (n, d) where the reference has followed the vertices that are held, as far as vertices may go."""
     del threads
-    moved = followed(points, mesh, reference, free)
-    way = moved - start
-    length = np.linalg.norm(way, axis=1)
-    far = length > max_move
-    moved[far] = start[far] + (max_move * WITHIN / length[far])[:, None] * way[far]
-    yield moved
+    yield Reach(start, max_move).drawn_in(followed(points, mesh, reference, free))
 
 
 def mend(
@@ -127,6 +120,8 @@ class _Body:
     """
 
     def __init__(self, simplices: NDArray[np.int32], reference: Array, free: NDArray[np.bool_]) -> None:
+        from scipy.sparse import csr_matrix  # slow to import, and seldom needed
+
         self.free, self.simplices = free, simplices[free[simplices].any(axis=1)]
         self.inverses = inverses(reference, self.simplices)
         self.slopes = np.concatenate([-self.inverses.sum(axis=1, keepdims=True), self.inverses], axis=1)

@@ -66,9 +66,10 @@ def untangle(
 ) -> None:
     """Move interior vertices until no element is inverted, then improve the worst angles.
 
-    Strategies: auto (thin layers follow a wall that has left them behind; Laplacian sweeps, the linear programme on stars that are still invalid, then FF where that is not
-    enough), FF (the foldover-free energy, minimised over all vertices at once), and the paper's LS (Laplacian), US
-    (linear programme), CS (both for each vertex), LUS (3 Laplacian sweeps, then the programme).
+    Strategies: auto (thin layers follow a wall that has left them behind; else Laplacian sweeps, the linear programme
+    on stars that are still invalid, then FF where that is not enough), FF (the foldover-free energy, minimised over all
+    vertices at once), and the paper's LS (Laplacian), US (linear programme), CS (both for each vertex), LUS (3
+    Laplacian sweeps, then the programme).
     """
     from meshfix_cli.meshfile.atomic import write_text
     from meshfix_cli.meshfile.writing import check_cells

@@ -173,11 +173,11 @@ def untangle(
 
     Notes
     -----
-    Source: section 4 for LS, US, CS and LUS, `foldover.py` for FF. "auto" first
-    lets layers follow a wall, see `layers.py`; then it is Laplacian sweeps until they stall; from
-    the best of those meshes cycles of LP sweeps on the stars that are still invalid. Where the Laplacian sweeps left
-    some, the graph's embedding is a second start, and the better one is kept. Both are first tried near the inverted
-    elements, where these are few; FF follows, first in the smallest region that can be solved.
+    Source: section 4 for LS, US, CS and LUS, `foldover.py` for FF. "auto" first lets layers follow a wall that has left
+    them behind. Else it is Laplacian sweeps until they stall; from the best of those meshes cycles of LP sweeps on the
+    stars that are still invalid. Where the Laplacian sweeps left some, the graph's embedding is a second start, and the
+    better one is kept. Both are first tried near the inverted elements, where these are few; FF follows, first in the
+    smallest region that can be solved.
     """
     phases = plan(strategy, smooth, only_invalid, reference is not None)
     places = None if reference is None else reference_points(mesh, reference, threads)

@@ -245,7 +245,7 @@ def repair(
     files: Files,
     method: Method,
     judge: Judge,
-    solve: Callable[[Mesh, float], Outcome] | None = None,
+    solve: Callable[..., Outcome] | None = None,
     put: Put | None = None,
     reference: NDArray[np.float64] | None = None,
 ) -> Report:
@@ -259,11 +259,11 @@ def repair(
     method : Method
     judge : Judge
     solve : callable
-        (mesh, how far vertices may move in model units) -> Outcome; default: `method.solve`.
+        (mesh, how far vertices may move in model units, reference=) -> Outcome; default: `method.solve`.
     put : callable
         See `writing.write`.
     reference : (k, d) float64
-        Gives elements their shapes, see `untangle.steps`; whoever solves must know it too.
+        Gives elements their shapes, see `untangle.steps`.
 
     Raises
     ------
@@ -274,7 +274,8 @@ def repair(
 
     threads = judge.threads
     reach = method.reach(document.mesh, threads)
-    outcome = method.solve(document.mesh, reach, threads) if solve is None else solve(document.mesh, reach)
+    solve = partial(method.solve, threads=threads) if solve is None else solve
+    outcome = solve(document.mesh, reach, reference=reference)
     meshes = outcome.after, outcome.untangled, outcome.before
     after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
     result, written = files.write(document, after, output, put)

@@ -79,7 +79,7 @@ def untangle(
     if verbose and show.quiet:
         raise click.UsageError("--quiet and --verbose exclude each other")
     if reference is not None:
-        _check_reference(reference, method, mpi)
+        _check_reference(reference, method)
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
         click.get_current_context().params["threads"] = 1
@@ -93,7 +93,7 @@ def untangle(
         if cells is not None:
             check_cells(document, cells)
         before = None if reference is None else held.read_reference(reference, document, show.threads)
-        alone = partial(method.solve, threads=show.threads, watch=watch, reference=before)
+        alone = partial(method.solve, threads=show.threads, watch=watch)
         solve, put = (root.solve, root.put) if root else (alone, None)
         report = repair(document, output, files, method, show.judge(draw, requirements), solve, put, before)
         if history is not None:
@@ -105,10 +105,10 @@ def untangle(
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 
-def _check_reference(reference: str, method: Method, mpi: bool) -> None:
+def _check_reference(reference: str, method: Method) -> None:
     """Refuse what makes no sense with a reference."""
     if reference == "-":
         raise click.UsageError("--reference is a file: stdin is INPUT's")
-    others = {"--mpi": mpi, "--only-invalid": method.only_invalid, "--threshold": method.threshold is not None}
+    others = {"--only-invalid": method.only_invalid, "--threshold": method.threshold is not None}
     for other in (name for name, given in others.items() if given):
         raise click.UsageError(f"--reference and {other} exclude each other")

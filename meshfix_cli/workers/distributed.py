@@ -60,6 +60,8 @@ class Part:
     block_colours : (own blocks,) int32
     reach : float
         How far vertices may move, in model units.
+    reference : (n, d) float64 or None
+        Where they were before the boundary moved.
     """
 
     vertices: Numbers
@@ -73,6 +75,7 @@ class Part:
     colours: Numbers
     block_colours: Numbers
     reach: float
+    reference: Array | None = None
 
 
 class Root:
@@ -94,8 +97,8 @@ class Root:
         self.owned: list[NDArray[np.int32]] = []
         self.busy = False  # the others are at work, and would wait for ever if this process ended
 
-    def solve(self, mesh: Mesh, reach: float) -> Outcome:
-        """Untangle a mesh; `reach`: how far vertices may move, in model units.
+    def solve(self, mesh: Mesh, reach: float, reference: Array | None = None) -> Outcome:
+        """Untangle a mesh; `reach`: how far vertices may move, in model units; `reference`: see `untangle.steps`.
 
         Raises
         ------
@@ -107,7 +110,7 @@ class Root:
         self._order("solve")
         own, self.owned, obstacles = None, [], find_obstacles(mesh, self.threads)
         hopeless = obstacles.hopeless(mesh)
-        for rank, part in enumerate(parts(mesh, self.comm.size, reach, self.threads, hopeless)):
+        for rank, part in enumerate(parts(mesh, self.comm.size, reach, self.threads, hopeless, reference)):
             self.owned.append(mesh.topology.connectivity.vertices[part.vertices[: part.own]])
             if rank == ROOT:
                 own = part
@@ -205,7 +208,7 @@ def _solved(
 ) -> tuple[Mesh | None, Mesh | None, Mesh | None, tuple[SweepRecord, ...], tuple[RankRecord, ...]]:
     """Solve one part; the root gets the whole mesh as it came, untangled and smoothed, the others None."""
     team = Ranks(comm, part, None if whole is None else whole.topology.stars(threads), threads)
-    *stages, records = drain(watch(method.steps(team.mesh, part.reach, threads, part.hopeless, team)))
+    *stages, records = drain(watch(method.steps(team.mesh, part.reach, threads, part.hopeless, team, part.reference)))
     known = {id(stages[0]): whole}
     for stage in stages:
         if id(stage) not in known:
@@ -216,7 +219,14 @@ def _solved(
     return before, untangled, after, records, tuple(ranks)
 
 
-def parts(mesh: Mesh, ranks: int, reach: float, threads: int, hopeless: Mask | None = None) -> Iterator[Part]:
+def parts(
+    mesh: Mesh,
+    ranks: int,
+    reach: float,
+    threads: int,
+    hopeless: Mask | None = None,
+    reference: Array | None = None,
+) -> Iterator[Part]:
     """Yield what each process holds; blocks are dealt out so that few edges go from one process to another."""
     stars = mesh.topology.stars(threads)
     points, movable = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
@@ -238,6 +248,7 @@ def parts(mesh: Mesh, ranks: int, reach: float, threads: int, hopeless: Mask | N
             vertices, len(own), points[vertices], movable[vertices], number[simplices], owner[simplices[:, 0]] == rank,
             np.zeros(len(rows), dtype=bool) if hopeless is None else hopeless[rows],
             owner[ghosts], colour[ghosts // kernels.BLOCK_SIZE], colour[blocks], reach,
+            None if reference is None else reference[vertices],
         )  # fmt: skip
 
 

@@ -79,7 +79,7 @@ def test_what_is_no_reference_is_refused_in_one_line(tmp_path: Path) -> None:
     assert error_line("untangle", "--reference", tmp_path / "no.vtk", TANGLED, out, code=1).endswith(
         "No such file or directory"
     )
-    for more in (["--mpi"], ["--only-invalid"], ["--threshold", "20"]):
+    for more in (["--only-invalid"], ["--threshold", "20"]):
         said = error_line("untangle", "--reference", VALID, *more, TANGLED, out, code=2)
         assert said == f"Error: --reference and {more[0]} exclude each other"
     assert (

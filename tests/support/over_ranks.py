@@ -13,11 +13,13 @@ from typing import Any
 
 import numpy as np
 
-sys.path += [str(Path(__file__).parents[2] / "sample_meshes"), str(Path(__file__).parent)]
+sys.path += [str(Path(__file__).parents[2] / name) for name in ("sample_meshes", "benchmarks", "tests/support")]
 import generate
+from layered import Points, body_of, layered, left_behind
 from meshes import tangle, with_an_inverted_fixed_simplex
 
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.reference import reference_points
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.records import Outcome
@@ -43,6 +45,8 @@ METHODS = {
     "plane": Method(),
     "planebest": Method(smooth="best"),
     "small": Method(),
+    "layers": Method(),
+    "reference": Method(),
 }
 
 
@@ -54,6 +58,8 @@ def mesh_of(case: str) -> Mesh:
         return tangle(Mesh.build(*generate.plate(0.18)))
     if case.endswith("FF"):
         return tangle(Mesh.build(*generate.bracket(0.18, 8)), 25, 2)
+    if case == "layers":
+        return left_behind(layered(3), body_of(layered(3)) + 0.01)
     valid = Mesh.build(*generate.bracket(0.06, 10))
     if case == "bestofvalid":
         return valid
@@ -61,7 +67,16 @@ def mesh_of(case: str) -> Mesh:
         return with_an_inverted_fixed_simplex(tangle(valid, 25, 2))
     if case == "finished":  # nothing is left to be gained
         return Method(smooth="best").solve(Method(smooth="best").solve(valid, np.inf, 2).after, np.inf, 2).after
+    if case == "reference":
+        bent = valid.points + 0.3 * np.sin(2 * valid.points[:, [1, 2, 0]])
+        return valid.with_points(np.where(valid.movable[:, None], valid.points, bent))
     return tangle(valid, 25, 1 if case == "onlyinvalid" else 2)
+
+
+def reference_of(case: str, mesh: Mesh) -> Points | None:
+    """Return where the vertices of a mesh were before its boundary moved, where that is the case."""
+    valid = Mesh.build(*generate.bracket(0.06, 10)) if case == "reference" else None
+    return None if valid is None else reference_points(mesh, valid)
 
 
 def facts(outcome: Outcome) -> tuple[Any, ...]:
@@ -83,10 +98,10 @@ def main(cases: list[str]) -> None:
             serve(comm, method, 1)
             continue
         root, mesh = Root(comm, method, 1), mesh_of(case)
-        reach = method.reach(mesh, 1)
-        found = facts(root.solve(mesh, reach))
+        reach, reference = method.reach(mesh, 1), reference_of(case, mesh)
+        found = facts(root.solve(mesh, reach, reference))
         root.dismiss(0)
-        print(case, found == facts(method.solve(mesh, reach, 2)), flush=True)
+        print(case, found == facts(method.solve(mesh, reach, 2, reference=reference)), flush=True)
 
 
 if __name__ == "__main__":

@@ -122,7 +122,7 @@ class Run:
             return self._goes_on(phase)
         if Move.LAPLACIAN in phase.moves:
             self.hard = False
-        if not self.hard if phase.embeds else self.is_done(phase):
+        if not self._asks_for_another_start() if phase.embeds else self.is_done(phase):
             return False
         if self.only_invalid or not (phase.moves or phase.embeds):
             return True
@@ -131,6 +131,10 @@ class Run:
             return False
         self.near = near
         return True
+
+    def _asks_for_another_start(self) -> bool:
+        """Whether Laplacian sweeps did not do, and the little that they left was not soon mended either."""
+        return self.hard and (self.many or self.left > 0)
 
     def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
         """Yield the points (k, d) after each sweep; the caller adds them before it asks for the next."""
@@ -148,7 +152,7 @@ class Run:
             self.near = self.free if rings is None else self._grown(self.near | self._broken(), rings)
             self.fewest, self.largest = self.left, self.measure  # what a smaller region reached is no measure
         near = self._smoothed(phase) if phase.smooths else self.near
-        if phase.until == "threshold":
+        if phase.until in ("threshold", "goal"):
             return self._mendings(phase, near)
         return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
 
@@ -156,7 +160,7 @@ class Run:
         """(n,) bool: the vertices that a phase of smoothing may move."""
         if self.only_invalid:
             return self._grown(self.near, NEAR)
-        if not phase.rings or self.near is self.free or phase.until == "threshold":
+        if not phase.rings or self.near is self.free or phase.until in ("threshold", "goal"):
             return self.free
         return self._grown(self.near | self._of(self._angles(self.points) < self.threshold), 0)
 
@@ -339,7 +343,8 @@ class Run:
         goal = min(GOAL[self.points.shape[1]] * self.threshold, math.pi / 2)
         fewest, largest, waited = len(self.mendable), -math.inf, 0
         angles = self._angles(self.points)
-        if self._least(angles) >= self.threshold and not (self.many and self.untangling > EASY):
+        well = self._least(angles) >= self.threshold and not (self.many and self.untangling > EASY)
+        if well and phase.until == "threshold":
             return
         while True:
             below, smallest = self.team.total(int((angles < goal)[self.own].sum())), self._least(angles)

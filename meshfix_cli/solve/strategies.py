@@ -51,13 +51,14 @@ class Phase:
         Those of the sweeps, in turn. None: the phase minimises the energy of `foldover.py`.
     max_sweeps : int or None
         None: the limit of all untangling sweeps, `SWEEPS` where there is none.
-    until : {"valid", "stalled", "settled", "threshold", "ceiling"}
+    until : {"valid", "stalled", "settled", "threshold", "goal", "ceiling"}
         When to stop early. "valid": no element that can be mended is inverted; "stalled": as well, or for
         `untangle.PATIENCE` turns through the moves neither were there fewer inverted elements nor was the smallest
         measure larger;
-        "settled": no vertex moved, which stops every phase; "threshold": no angle is below it, or nothing gets better
-        any more; "ceiling": the smallest sine is that of the simplices without a free vertex, or does not rise any
-        more. The last three are phases of smoothing.
+        "settled": no vertex moved, which stops every phase; "goal": no angle is below it, or nothing gets better any
+        more; "threshold": as well, and at once where no angle is below that and the tangle was not a hard one;
+        "ceiling": the smallest sine is that of the simplices without a free vertex, or does not rise any more. The last
+        four are phases of smoothing.
     only_invalid : bool
         LP moves visit only stars with an inverted element and those whose neighbours moved in the sweep before.
     from_best : bool
@@ -82,7 +83,7 @@ class Phase:
     name: str
     moves: tuple[Move, ...] = ()
     max_sweeps: int | None = None
-    until: Literal["valid", "stalled", "settled", "threshold", "ceiling"] = "valid"
+    until: Literal["valid", "stalled", "settled", "threshold", "goal", "ceiling"] = "valid"
     only_invalid: bool = False
     from_best: bool = False
     rings: tuple[int | None, ...] = ()
@@ -94,7 +95,7 @@ class Phase:
     @property
     def smooths(self) -> bool:
         """Whether it is a phase of smoothing."""
-        return self.until in ("settled", "threshold", "ceiling")
+        return self.until in ("settled", "threshold", "goal", "ceiling")
 
 
 _LAPLACIAN = Phase("Laplacian", (Move.LAPLACIAN,))
@@ -190,7 +191,7 @@ def plan(
     if only_invalid and smooth == 0:
         return (*untangling, _BACK)
     if smooth == "best":
-        return (*untangling, passes, _MORE, *_BEST)
+        return (*untangling, passes, replace(_MORE, until="goal"), *_BEST)
     if smooth == "auto":
         return (*untangling, replace(passes, rings=RINGS), *(() if only_invalid else (_MORE,)))
     return (*untangling, replace(passes, max_sweeps=smooth))

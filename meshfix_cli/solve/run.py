@@ -35,6 +35,7 @@ REGION_PATIENCE = 5  # minimisations without fewer inverted elements after which
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
 EASY = 3  # sweeps: a tangle that took more, and of which at least `MANY` of the elements were inverted, was a hard one
 MANY = 0.25
+MOST = 0.5  # of the elements: where they were inverted, another start is tried in any case
 GOAL = {2: 1.3, 3: 1.6}  # times the threshold: up to there, where three passes of smoothing do not suffice
 GOAL_RINGS = 4  # around the elements below the goal that are smoothed
 GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
@@ -104,7 +105,8 @@ class Run:
         self.shaped = False  # since the smallest angle was raised
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
         self.untangling = 0  # sweeps
-        self.many = self.left >= MANY * self.team.total(int(self.own.sum()))
+        share = self.left / max(1, self.team.total(int(self.own.sum())))
+        self.many, self.most = share >= MANY, share >= MOST
         # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
         self.floor = self.min_measure
@@ -179,7 +181,7 @@ class Run:
         self.untangling += not phase.smooths
         self.targeted = self.targeted or (phase.layers and self.left == 0)
         if Move.LAPLACIAN in phase.moves:
-            self.hard = self.promising > 0 or (self.many and sweep > EASY)
+            self.hard = self.promising > 0 or self.most or (self.many and sweep > EASY)
         now = (self.points, self.record, self._rank())
         self.best = now if self.best is None else min(self.best, now, key=lambda one: one[2])
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)

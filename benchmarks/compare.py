@@ -127,7 +127,6 @@ def main() -> None:
         meshes = {options.mesh.stem: read(str(options.mesh)).mesh}
     else:
         meshes = {name: Mesh.build(*GEOMETRIES[name]()) for name in GEOMETRY_NAMES}
-    untangle(next(tangled("", next(iter(meshes.values()))))[1], "FF")  # scipy's import is nobody's time
     for name, mesh in meshes.items():
         for case, start in tangled(name, mesh, cases):
             add_rows(table, case, start)

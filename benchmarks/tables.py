@@ -18,6 +18,7 @@ from rich.table import Table
 from meshfix_cli import Mesh, perturb, read, summarise, untangle
 from meshfix_cli.report.as_json import history_csv
 from meshfix_cli.solve.records import Outcome
+from meshfix_cli.solve.strategies import PASSES, SMOOTH, SMOOTHING
 
 CASES = ((5, 1), (10, 1), (25, 1), (50, 1), (25, 2), (25, 4), (25, 8))  # percent, multiples of h
 
@@ -51,12 +52,12 @@ class Result:
 
 
 def run(mesh: Mesh, strategy: str) -> Result:
-    """Untangle and smooth; angles are (smallest, mean of the elements' smallest)."""
-    outcome = untangle(mesh, strategy)
+    """Untangle and smooth, the paper's strategies by its three passes; angles are (smallest, mean of the smallest)."""
+    outcome = untangle(mesh, strategy, smooth=SMOOTH if strategy == "auto" else PASSES)
     phases: dict[str, int] = {}
     left = outcome.records[0].inverted
     for record in outcome.records:
-        if record.phase not in ("input", "best", "smoothing"):
+        if not record.phase.startswith(("input", "best", SMOOTHING)):
             phases[record.phase] = record.sweep
             left = record.inverted
     before, after = summarise(outcome.untangled), summarise(outcome.after)

@@ -40,7 +40,9 @@ GOAL = {2: 1.3, 3: 1.6}  # times the threshold: up to there, where three passes 
 GOAL_RINGS = 4  # around the elements below the goal that are smoothed
 GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
 GOAL_PATIENCE = 2
-_Start = tuple[NDArray[np.float64], SweepRecord, tuple[int, float]]
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+_Start = tuple[Array, SweepRecord, tuple[int, float]]
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
 
 
@@ -49,7 +51,7 @@ def _raised(sine2: float, degrees: float) -> float:
     return math.sin(min(math.asin(math.sqrt(sine2)) + math.radians(degrees), math.pi / 2)) ** 2
 
 
-def _due(vertices: NDArray[np.bool_]) -> NDArray[np.uint8]:
+def _due(vertices: Mask) -> NDArray[np.uint8]:
     """States for a sweep that visits these vertices (n,)."""
     return vertices.astype("u1") * kernels.DUE
 
@@ -66,10 +68,10 @@ class Run:
         threshold_sine2: float,
         max_move: float,
         only_invalid: bool,
-        hopeless: NDArray[np.bool_] | None,
+        hopeless: Mask | None,
         threads: int,
         team: Team,
-        reference: NDArray[np.float64] | None = None,
+        reference: Array | None = None,
     ) -> None:
         self.clock = time.perf_counter()
         self.threshold = math.asin(math.sqrt(threshold_sine2))
@@ -100,7 +102,7 @@ class Run:
         self.near = self.free & self.broken if only_invalid else self.free
         self.reference, self.targeted = reference, reference is not None
         self.rival: _Start | None = None
-        self.kept: tuple[NDArray[np.float64], SweepRecord, float] | None = None
+        self.kept: tuple[Array, SweepRecord, float] | None = None
         self.lost = False  # what the last minimisation of the shape began with
         self.shaped = False  # since the smallest angle was raised
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
@@ -138,7 +140,7 @@ class Run:
         """Whether Laplacian sweeps did not do, and the little that they left was not soon mended either."""
         return self.hard and (self.many or self.left > 0)
 
-    def sweeps(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+    def sweeps(self, phase: Phase) -> Iterator[Array]:
         """Yield the points (k, d) after each sweep; the caller adds them before it asks for the next."""
         self.changed[:] = False
         if phase.to_reference:
@@ -158,7 +160,7 @@ class Run:
             return self._mendings(phase, near)
         return self._raisings(phase.moves[0], near) if phase.until == "ceiling" else self._relocations(phase, near)
 
-    def _smoothed(self, phase: Phase) -> NDArray[np.bool_]:
+    def _smoothed(self, phase: Phase) -> Mask:
         """(n,) bool: the vertices that a phase of smoothing may move."""
         if self.only_invalid:
             return self._grown(self.near, NEAR)
@@ -166,7 +168,7 @@ class Run:
             return self.free
         return self._grown(self.near | self._of(self._angles(self.points) < self.threshold), 0)
 
-    def add(self, phase: Phase, points: NDArray[np.float64]) -> bool:
+    def add(self, phase: Phase, points: Array) -> bool:
         """Take the points (k, d) of a sweep; return whether there was progress.
 
         Progress is fewer inverted elements than ever in the run, or a smallest measure that is larger by `PROGRESS`.
@@ -200,7 +202,7 @@ class Run:
             self.best = one if (mean >= its_mean if same else smallest > its_smallest) else other
         return self._return_to(*self.best[:2])
 
-    def _after_passes(self, points: NDArray[np.float64]) -> tuple[float, int]:
+    def _after_passes(self, points: Array) -> tuple[float, int]:
         """Return the smallest of the smallest angles, in radians, and their sum, in steps."""
         for _ in range(PASSES):
             points = self._relocated(points, Move.COMBINED_SMOOTH, _due(self.near & self.team.own_vertices))
@@ -238,7 +240,7 @@ class Run:
         points, record, _ = self.best if untangling or mended else self.first
         return self._return_to(points, record)
 
-    def _return_to(self, points: NDArray[np.float64], record: SweepRecord) -> bool:
+    def _return_to(self, points: Array, record: SweepRecord) -> bool:
         if points is self.points:
             return False
         self.points = points
@@ -265,24 +267,24 @@ class Run:
         inverted, measure = self.left + self.beyond_repair[0], min(self.measure, self.beyond_repair[1])
         return SweepRecord(phase, sweep, inverted, measure, moved, time.perf_counter() - self.clock)
 
-    def _count(self, vertices: NDArray[np.bool_]) -> int:
+    def _count(self, vertices: Mask) -> int:
         return self.team.total(int((vertices & self.team.own_vertices).sum()))
 
-    def _broken(self) -> NDArray[np.bool_]:
+    def _broken(self) -> Mask:
         """(n,) bool: the vertices of inverted simplices that can be mended."""
         return self._of(self.inverted)
 
-    def _of(self, simplices: NDArray[np.integer] | NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _of(self, simplices: NDArray[np.integer] | Mask) -> Mask:
         """(n,) bool: the vertices of some simplices that can be mended."""
         mask = np.zeros(len(self.points), dtype=bool)
         mask[self.mendable[simplices]] = True
         return self.team.shared(mask)
 
-    def _grown(self, vertices: NDArray[np.bool_], rings: int) -> NDArray[np.bool_]:
+    def _grown(self, vertices: Mask, rings: int) -> Mask:
         """(n,) bool: free vertices among these and `rings` rings of neighbours around them."""
         return self.free & self.team.grown(vertices, rings)
 
-    def _relocations(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+    def _relocations(self, phase: Phase, near: Mask) -> Iterator[Array]:
         near = near & self.team.own_vertices
         states = _due(near)
         self.floor = self.measure if Move.COME_BACK in phase.moves else self.min_measure
@@ -293,13 +295,19 @@ class Run:
                 states = _due(near & (self._broken() | self._grown(self.changed, 1)))
             yield self._relocated(self.points, move, states)
 
-    def _another_start(self) -> Iterator[NDArray[np.float64]]:
+    def _another_start(self) -> Iterator[Array]:
+        """Yield the points with those near by in the graph's embedding, as far as they may go."""
         self.rival, self.best = self.best, None
         self.fewest, self.largest = len(self.mendable), -math.inf
-        compute = partial(_embedded, self.max_move, self.threads)
+
+        def compute(stars: kernels.Connectivity, points: Array, start: Array, near: Mask) -> Iterator[Array]:
+            from meshfix_cli.solve.foldover import Reach, embedding
+
+            yield Reach(start, self.max_move).drawn_in(embedding(points, stars, near, self.threads))
+
         yield from self.team.of_whole(compute, self.points, self.first[0], self.near)
 
-    def _shape(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+    def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
         if self.max_move < math.inf or self.left or not self.free.any():
             return
@@ -308,7 +316,11 @@ class Run:
         self.kept = self.points, self.record, smallest
         goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
         floor = math.degrees(smallest) if phase.shapes == "lost" else 0.0
-        compute = partial(_shaped, Goal(goal, floor, max(self.min_measure, 0.0)), self.threads)
+        aims = Goal(goal, floor, max(self.min_measure, 0.0))
+
+        def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
+            yield shaped(points, stars, free, aims, self.threads)
+
         yield from self.team.of_whole(compute, self.points, self._smoothed(phase))
 
     def _goes_on(self, phase: Phase) -> bool:
@@ -339,7 +351,7 @@ class Run:
         self.lost = self._least(self._angles(self.points)) < smallest - math.radians(GAIN)
         return self.lost and self._return_to(points, record)
 
-    def _mendings(self, phase: Phase, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+    def _mendings(self, phase: Phase, near: Mask) -> Iterator[Array]:
         """Yield sweeps around what is below the goal, turn by turn, as long as that becomes less or better."""
         self.floor = self.min_measure
         goal = min(GOAL[self.points.shape[1]] * self.threshold, math.pi / 2)
@@ -362,7 +374,7 @@ class Run:
                 yield self._relocated(self.points, move, states, floor)
             angles = self._angles(self.points)
 
-    def _raisings(self, move: Move, near: NDArray[np.bool_]) -> Iterator[NDArray[np.float64]]:
+    def _raisings(self, move: Move, near: Mask) -> Iterator[Array]:
         ceiling = self._min_sine2(self.stuck)
         smallest, waited = self._min_sine2(self.mendable), 0
         while smallest < ceiling and waited < RAISE_PATIENCE:
@@ -372,8 +384,8 @@ class Run:
             smallest = max(smallest, now)
 
     def _relocated(
-        self, points: NDArray[np.float64], move: Move, states: NDArray[np.uint8], threshold_sine2: float | None = None
-    ) -> NDArray[np.float64]:
+        self, points: Array, move: Move, states: NDArray[np.uint8], threshold_sine2: float | None = None
+    ) -> Array:
         """Return the points (k, d) after a sweep, which keeps account in `states`; the threshold is the user's."""
         threshold_sine2 = self.threshold_sine2 if threshold_sine2 is None else threshold_sine2
         points = points.copy()
@@ -387,41 +399,27 @@ class Run:
     def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
         return self.team.least(kernels.min_sine2(self.points, simplices, self.threads))
 
-    def _angles(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _angles(self, points: Array) -> Array:
         """Return the smallest angle of each simplex that can be mended, in radians."""
         return kernels.angles(points, self.mendable, self.threads)[0]
 
-    def _steps(self, angles: NDArray[np.float64]) -> int:
+    def _steps(self, angles: Array) -> int:
         """Return the sum of the own simplices' angles as an integer, which does not depend on the order."""
         return int((angles * ANGLE_STEPS).astype("i8")[self.own].sum())
 
-    def _least(self, angles: NDArray[np.float64]) -> float:
+    def _least(self, angles: Array) -> float:
         return self.team.least(float(angles.min(initial=math.pi)))
 
-    def _towards_reference(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+    def _towards_reference(self, phase: Phase) -> Iterator[Array]:
         from meshfix_cli.solve import layers, towards
 
         compute = partial(getattr(layers if phase.layers else towards, phase.to_reference), self.max_move, self.threads)
         reference = () if self.reference is None or phase.layers else (self.reference,)
         return self.team.of_whole(compute, self.points, self.first[0], *reference, self.free)
 
-    def _minimisations(self, phase: Phase) -> Iterator[NDArray[np.float64]]:
+    def _minimisations(self, phase: Phase) -> Iterator[Array]:
         compute = partial(_minimisations, phase.rings, self.max_move, self.threads)
         return self.team.of_whole(compute, self.points, self.first[0], self.free, self._broken())
-
-
-def _embedded(
-    max_move: float,
-    threads: int,
-    stars: kernels.Connectivity,
-    points: NDArray[np.float64],
-    start: NDArray[np.float64],
-    near: NDArray[np.bool_],
-) -> Iterator[NDArray[np.float64]]:
-    """Yield the points with those near by in the graph's embedding, as far as they may go."""
-    from meshfix_cli.solve.foldover import Reach, embedding
-
-    yield Reach(start, max_move).drawn_in(embedding(points, stars, near, threads))
 
 
 def _minimisations(
@@ -429,11 +427,11 @@ def _minimisations(
     max_move: float,
     threads: int,
     stars: kernels.Connectivity,
-    points: NDArray[np.float64],
-    start: NDArray[np.float64],
-    free: NDArray[np.bool_],
-    broken: NDArray[np.bool_],
-) -> Iterator[NDArray[np.float64]]:
+    points: Array,
+    start: Array,
+    free: Mask,
+    broken: Mask,
+) -> Iterator[Array]:
     """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
     from meshfix_cli.solve.foldover import QUICK, THOROUGH, Reach, drawn_into_reach, minimisations
 
@@ -454,14 +452,3 @@ def _minimisations(
                 break
         if rings is None:
             yield from drawn_into_reach(stars, near, reach, threads)
-
-
-def _shaped(
-    goal: Goal,
-    threads: int,
-    stars: kernels.Connectivity,
-    points: NDArray[np.float64],
-    free: NDArray[np.bool_],
-) -> Iterator[NDArray[np.float64]]:
-    """Yield the points (k, d) where the shape of all elements is best."""
-    yield shaped(points, stars, free, goal, threads)

@@ -49,8 +49,6 @@ inline void add_slopes_of_angle(const Edges<3>& e, std::size_t k, double factor,
 template <int D>
 class Shape {
    public:
-    static constexpr int DIMENSION = D;
-
     // points (n, D), the `free` ones first; simplices (m, D+1).
     Shape(const double* points, std::int64_t n, std::int64_t free, const std::int32_t* simplices, std::int64_t m,
           ShapeGoal goal, int threads)

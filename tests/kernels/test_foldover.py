@@ -249,3 +249,13 @@ def test_the_embedding_is_the_solution_of_the_sparse_system(
     assert embedded[~free].tobytes() == points[~free].tobytes()
     for threads in (2, 3):
         assert kernels.embedding(points, stars, free, threads).tobytes() == embedded.tobytes()
+
+
+@pytest.mark.parametrize("sizes", [1e6, 1e12])
+def test_the_embedding_does_not_depend_on_where_its_vertices_come_from(fine: Mesh, sizes: float) -> None:
+    stars, free = fine.topology.stars(), fine.along_curve(fine.movable)
+    points = fine.along_curve(fine.points)
+    far = points.copy()
+    far[np.flatnonzero(free)[::7]] += sizes
+    near, back = (kernels.embedding(start, stars, free, 1) for start in (points, far))
+    assert near.tobytes() == back.tobytes()

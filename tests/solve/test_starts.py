@@ -61,6 +61,19 @@ def test_the_better_start_is_kept(name: str) -> None:
         assert one.min_angle > other.min_angle - 0.1
 
 
+@pytest.mark.parametrize("name", ["plate with holes", "annulus", "box with pipes", "block"])
+@pytest.mark.parametrize("sizes", [1e4, 1e8, 1e10, 1e12])
+def test_a_vertex_thrown_far_away_comes_back(name: str, sizes: float, random: np.random.Generator) -> None:
+    mesh = Mesh.build(*GEOMETRIES[name]())
+    points = mesh.points.copy()
+    direction = random.normal(size=mesh.dimension)
+    size = np.ptp(points, axis=0).max()
+    points[random.choice(np.flatnonzero(mesh.movable))] += sizes * size * direction / np.linalg.norm(direction)
+    outcome = untangle(mesh.with_points(points))
+    assert outcome.valid
+    assert summarise(outcome.after).min_angle > 0.5 * summarise(mesh).min_angle
+
+
 def test_the_embedding_stays_within_the_bound(plate: Mesh) -> None:
     tangled = tangle(plate, 100, 8)
     h = tangled.mean_edge_length()

@@ -4,6 +4,7 @@
 // gradients, preconditioned by the numbers of neighbours.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -23,9 +24,8 @@ class Embedding {
             if (!free[v]) continue;
             number[v] = static_cast<std::int32_t>(vertices_.size());
             vertices_.push_back(static_cast<std::int32_t>(v));
-            middle_ = middle_ + load<D>(points + v * D);
         }
-        middle_ = (1.0 / static_cast<double>(vertices_.size())) * middle_;
+        set_middle(stars, points, number);
         for (std::int32_t v : vertices_) {
             Vec<D> held{};
             for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
@@ -73,6 +73,20 @@ class Embedding {
                        [&](std::int64_t begin, std::int64_t end, std::int64_t) {
                            for (std::int64_t v = begin; v < end; ++v) f(v);
                        });
+    }
+
+    // The origin is among the held neighbours, as the solution is, wherever the free vertices come from.
+    void set_middle(StarsView stars, const double* points, const std::vector<std::int32_t>& number) {
+        std::int64_t count = 0;
+        for (std::int32_t v : vertices_) {
+            for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
+                const std::int32_t other = stars.neighbours[i];
+                if (number[other] >= 0) continue;
+                middle_ = middle_ + load<D>(points + static_cast<std::int64_t>(other) * D);
+                ++count;
+            }
+        }
+        middle_ = (1.0 / static_cast<double>(std::max<std::int64_t>(count, 1))) * middle_;
     }
 
     static void put_at(const Vec<D>& x, Numbers& to, std::int64_t v) {

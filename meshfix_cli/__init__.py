@@ -6,11 +6,8 @@
 >>> write(document, outcome.after, "valid.vtk")
 """
 
-from __future__ import annotations
-
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
+# Nothing is imported here: it would be before `__main__` can make an early signal end the process without a word.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
@@ -36,7 +33,9 @@ _HOME = {
 }
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)

@@ -1,6 +1,5 @@
 """`meshfix` and `python -m meshfix_cli`: from here on signals end the process without a word."""
 
-import gc
 import os
 import signal
 
@@ -8,6 +7,8 @@ import signal
 for _name in ("SIGINT", "SIGTERM", "SIGHUP"):
     if hasattr(signal, _name) and signal.getsignal(getattr(signal, _name)) != signal.SIG_IGN:  # as nohup does
         signal.signal(getattr(signal, _name), lambda number, _: os._exit(128 + number))
+
+import gc
 
 # What is imported makes many objects, and no garbage: looking for some after each 700 takes a tenth of a small run.
 gc.set_threshold(50_000)

@@ -36,8 +36,8 @@ class Shape:
     simplices : tuple of tuples of int
         The corner simplices: each a node and its neighbours in the element, in the order that makes all determinants
         positive in a valid element.
-    weight : float
-        Turns the determinant of the unit edges at a corner of the regular element into 1: scaled Jacobians.
+    ideal : tuple of tuples of float
+        The edges of a corner simplex from its first node, in the ideal element.
     """
 
     name: str
@@ -46,7 +46,16 @@ class Shape:
     corners: int
     facets: Rows = ()
     simplices: Rows = ()
-    weight: float = 1.0
+    ideal: tuple[tuple[float, ...], ...] = ()
+
+    @property
+    def weight(self) -> float:
+        """Turns the determinant of the unit edges at an ideal corner into 1: scaled Jacobians."""
+        edges = self.ideal
+        if len(edges) < 3:
+            return 1.0 if len(edges) < 2 else 1 / (edges[0][0] * edges[1][1] - edges[0][1] * edges[1][0])
+        (a, b, c), (d, e, f), (g, h, i) = edges
+        return 1 / (a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g))
 
     @property
     def facet(self) -> str:
@@ -77,8 +86,9 @@ class Element:
         0: any.
     vtk, gmsh : int or None
         The numbers by which these know it.
-    judged_by : str or None
-        What decides whether it is valid; None: it is held, and not judged.
+    judged_by : {"determinant", "corners", "coefficients"} or None
+        What decides whether it is valid: the one determinant, those of the corner simplices, or the Bezier coefficients
+        of the Jacobian determinant; None: it is held, and not judged.
     """
 
     key: str
@@ -97,22 +107,25 @@ class Element:
 _VERTEX = Shape("vertex", "vertices", 0, 1)
 _LINE = Shape("line", "lines", 1, 2, ((1,), (0,)), ((0, 1),))
 _TRIANGLE = Shape(
-    "triangle", "triangles", 2, 3, ((1, 2), (2, 0), (0, 1)), ((0, 1, 2),), 2 / math.sqrt(3)
+    "triangle", "triangles", 2, 3, ((1, 2), (2, 0), (0, 1)), ((0, 1, 2),), ((1, 0), (0.5, math.sqrt(0.75)))
 )  # fmt: skip
 _QUAD = Shape(
     "quadrilateral", "quadrilaterals", 2, 4, ((0, 1), (1, 2), (2, 3), (3, 0)),
-    ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)),
+    ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)), ((1, 0), (0, 1)),
 )  # fmt: skip
 _TETRA = Shape(
-    "tetrahedron", "tetrahedra", 3, 4, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)), ((0, 1, 2, 3),), math.sqrt(2)
+    "tetrahedron", "tetrahedra", 3, 4, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)), ((0, 1, 2, 3),),
+    ((1, 0, 0), (0.5, math.sqrt(0.75), 0), (0.5, math.sqrt(1 / 12), math.sqrt(2 / 3))),
 )  # fmt: skip
 _PYRAMID = Shape(
     "pyramid", "pyramids", 3, 5, ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
-    ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)), math.sqrt(2),
+    ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
+    ((1, 0, 0), (0, 1, 0), (0.5, 0.5, math.sqrt(0.5))),
 )  # fmt: skip
 _WEDGE = Shape(
     "wedge", "wedges", 3, 6, ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
-    ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)), 2 / math.sqrt(3),
+    ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
+    ((1, 0, 0), (0.5, math.sqrt(0.75), 0), (0, 0, 1)),
 )  # fmt: skip
 _HEXAHEDRON = Shape(
     "hexahedron", "hexahedra", 3, 8,
@@ -121,6 +134,7 @@ _HEXAHEDRON = Shape(
         (0, 1, 3, 4), (1, 2, 0, 5), (2, 3, 1, 6), (3, 0, 2, 7),
         (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
     ),
+    ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
 )  # fmt: skip
 _PIXEL = Shape("pixel", "pixels", 2, 0)  # VTK's own order of a rectangle's and a box's corners
 _VOXEL = Shape("voxel", "voxels", 3, 0)
@@ -135,21 +149,21 @@ _TABLE = (
     Element("triangle", _TRIANGLE, 3, vtk=5, gmsh=2, judged_by="determinant"),
     Element("triangle6", _TRIANGLE, 6, vtk=22, gmsh=9),
     Element("triangle7", _TRIANGLE, 7, vtk=34),
-    Element("quad", _QUAD, 4, vtk=9, gmsh=3),
+    Element("quad", _QUAD, 4, vtk=9, gmsh=3, judged_by="corners"),
     Element("quad6", _QUAD, 6, vtk=30),
     Element("quad8", _QUAD, 8, vtk=23, gmsh=16),
     Element("quad9", _QUAD, 9, vtk=28, gmsh=10),
     Element("tetra", _TETRA, 4, vtk=10, gmsh=4, judged_by="determinant"),
     Element("tetra10", _TETRA, 10, vtk=24, gmsh=11),
-    Element("pyramid", _PYRAMID, 5, vtk=14, gmsh=7),
+    Element("pyramid", _PYRAMID, 5, vtk=14, gmsh=7, judged_by="corners"),
     Element("pyramid13", _PYRAMID, 13, vtk=27, gmsh=19),
     Element("pyramid14", _PYRAMID, 14, gmsh=14),
     Element("pyramid19", _PYRAMID, 19, vtk=37),
-    Element("wedge", _WEDGE, 6, vtk=13, gmsh=6),
+    Element("wedge", _WEDGE, 6, vtk=13, gmsh=6, judged_by="coefficients"),
     Element("wedge12", _WEDGE, 12, vtk=31),
     Element("wedge15", _WEDGE, 15, vtk=26, gmsh=18),
     Element("wedge18", _WEDGE, 18, vtk=32, gmsh=13),
-    Element("hexahedron", _HEXAHEDRON, 8, vtk=12, gmsh=5),
+    Element("hexahedron", _HEXAHEDRON, 8, vtk=12, gmsh=5, judged_by="coefficients"),
     Element("hexahedron20", _HEXAHEDRON, 20, vtk=25, gmsh=17),
     Element("hexahedron24", _HEXAHEDRON, 24, vtk=33),
     Element("hexahedron27", _HEXAHEDRON, 27, vtk=29, gmsh=12),
@@ -163,6 +177,9 @@ ELEMENTS = {element.key: element for element in _TABLE}
 
 # What is solved for, by its dimension.
 SIMPLICES = {element.shape.dimension: element for element in _TABLE if element.judged_by == "determinant"}
+
+# All that is judged, in the order of the kernels' numbers for them.
+JUDGED = tuple(ELEMENTS[key] for key in ("triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"))
 
 # Types that are not in the table have a shape by their names: tetra35, VTK_LAGRANGE_WEDGE, penta_prism, ...
 _FAMILIES = {

@@ -17,6 +17,24 @@ _T = TypeVar("_T", bound=np.generic)
 
 
 @dataclass(frozen=True, eq=False)
+class Block:
+    """The elements of one type.
+
+    Attributes
+    ----------
+    element : Element
+    rows : (k,) int32
+        Which of the mesh's elements they are, ascending.
+    vertices : (k, nodes) int32
+        Their vertices, positively oriented.
+    """
+
+    element: Element
+    rows: NDArray[np.int32]
+    vertices: NDArray[np.int32]
+
+
+@dataclass(frozen=True, eq=False)
 class Topology:
     """Connectivity, computed once and shared by every position of the points.
 
@@ -93,6 +111,11 @@ class Topology:
         """(m, d+1) int32: the vertices of each simplex, positively oriented."""
         mesh = self.connectivity
         return read_only(self.of_rows(mesh.vertices[mesh.simplices]))
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The elements by their types."""
+        return (Block(self.element, read_only(np.arange(self.m, dtype=np.int32)), self.simplices),)
 
     @cached_property
     def component(self) -> NDArray[np.int32]:

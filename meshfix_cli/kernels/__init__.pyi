@@ -1,5 +1,7 @@
 """The compiled kernels; arrays are C-contiguous and of exactly these types (nothing is converted)."""
 
+from typing import overload
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,12 +15,19 @@ DUE: int
 BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
 
 class Connectivity:
-    """A mesh in the order of the kernels; the arrays are described in mesh/order.hpp, facets.hpp and stars.hpp.
+    """A mesh in the order of the kernels; the arrays are described in mesh/order.hpp, facets, elements and stars.hpp.
 
-    All of them are views; faces and what follows it are empty until the stars are built.
+    All of them are views; faces and what follows it are empty until the stars are built. Elements that are not all
+    simplices of one type are given by their codes (m,), in the order of `elements.JUDGED`, and their nodes, one element
+    behind the other; they have corner simplices once they are taken apart.
     """
 
+    @overload
     def __init__(self, points: Float64, simplices: Int32, used: Int32, threads: int) -> None: ...
+    @overload
+    def __init__(self, points: Float64, codes: Uint8, nodes: Int32, used: Int32, threads: int) -> None: ...
+    def take_apart(self, flipped: NDArray[np.bool_], threads: int) -> None:
+        """Give some elements (m,) the other orientation, and make the corner simplices of all."""
     @staticmethod
     def part(simplices: Int32, n: int, threads: int) -> Connectivity:
         """A part of a mesh that has an order already: n vertices and simplices (m, d+1) that stay as they are.
@@ -39,17 +48,38 @@ class Connectivity:
         """Mark these vertices (n,) and rings of neighbours."""
 
     def stuck(self, movable: NDArray[np.bool_], threads: int) -> Int32:
-        """Simplices without a movable vertex."""
+        """Elements without a movable vertex."""
 
     def boundary(self) -> NDArray[np.uint8]:
-        """1 for the vertices (k,) of facets that belong to one simplex."""
+        """1 for the vertices (k,) of facets that belong to one element."""
 
-    def fixed_facets(self, movable: NDArray[np.bool_], threads: int) -> tuple[Int32, Int32, Uint8]:
-        """Facets (f, d) without a movable vertex, each once, a simplex of each, and 1 where two share it.
+    def fixed_facets(
+        self, movable: NDArray[np.bool_], threads: int, other_diagonal: bool = False
+    ) -> tuple[Int32, Int32, Uint8]:
+        """Facets (f, d) without a movable vertex, each once, an element of each, and 1 where two share it.
 
-        They are oriented: the simplices are all on the same side of them.
+        They are oriented: the elements are all on the same side of them. Quadrilaterals are two triangles, by one or
+        the other diagonal.
         """
 
+    @property
+    def codes(self) -> Uint8:
+        """Empty where all elements are simplices of one type; then what follows is empty, too."""
+
+    @property
+    def node_offsets(self) -> Int32: ...
+    @property
+    def nodes(self) -> Int32: ...
+    @property
+    def facet_offsets(self) -> Int32: ...
+    @property
+    def facet_owners(self) -> Int32: ...
+    @property
+    def facet_mates(self) -> Int32: ...
+    @property
+    def simplex_offsets(self) -> Int32: ...
+    @property
+    def owners(self) -> Int32: ...
     @property
     def crowded(self) -> int:
         """A corner whose facet is shared by too many simplices, then there is no more; or -1."""

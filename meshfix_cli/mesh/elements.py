@@ -181,6 +181,9 @@ SIMPLICES = {element.shape.dimension: element for element in _TABLE if element.j
 # All that is judged, in the order of the kernels' numbers for them.
 JUDGED = tuple(ELEMENTS[key] for key in ("triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"))
 
+# What stands for elements of several types, by their dimension.
+MIXED = {d: Element("mixed", Shape("element", "elements", d, 0), 0) for d in (2, 3)}
+
 # Types that are not in the table have a shape by their names: tetra35, VTK_LAGRANGE_WEDGE, penta_prism, ...
 _FAMILIES = {
     3: ("tetra", "hexa", "wedge", "pyramid", "penta", "voxel", "polyhedron"),

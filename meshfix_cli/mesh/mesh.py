@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
@@ -10,7 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import counted
+from meshfix_cli.mesh.elements import SIMPLICES, counted
+from meshfix_cli.mesh.judged import Judged
+from meshfix_cli.mesh.mixed import build_mixed, checked_blocks
 from meshfix_cli.mesh.topology import Topology, build_topology, read_only, rows_of
 
 _T = TypeVar("_T", bound=np.generic)
@@ -41,14 +44,21 @@ class Mesh:
     apart: bool = False
 
     @classmethod
-    def build(cls, points: ArrayLike, simplices: ArrayLike, fixed: ArrayLike | None = None, threads: int = 1) -> Mesh:
-        """Check the arrays, orient the simplices and fix the boundary.
+    def build(
+        cls,
+        points: ArrayLike,
+        cells: ArrayLike | Sequence[tuple[str, ArrayLike]],
+        fixed: ArrayLike | None = None,
+        threads: int = 1,
+    ) -> Mesh:
+        """Check the arrays, orient the elements and fix the boundary.
 
         Parameters
         ----------
         points : (n, d) float
-            d = 2 for triangles, 3 for tetrahedra.
-        simplices : (m, d+1) int
+            d = 2 for triangles and quadrilaterals, 3 for solids.
+        cells : (m, d+1) int, or sequence of (str, (k, nodes) int)
+            Simplices, or elements by their types, such as ("hexahedron", ...), which are numbered in this order.
             Numbered either way round; see `Topology.flipped`.
         fixed : (n,) bool, optional
             Vertices that must not move, beside those of the boundary.
@@ -57,14 +67,23 @@ class Mesh:
         Raises
         ------
         InvalidMeshError
-            Wrong shapes, no simplices, indices out of range, coordinates that are not finite or too large,
-            a simplex that names a vertex twice, a facet of more than two simplices, a Moebius band.
+            Wrong shapes, no elements, indices out of range, coordinates that are not finite or too large,
+            an element that names a vertex twice, a facet of more than two elements, a Moebius band.
         """
         p = np.array(points, dtype=np.float64, order="C")
-        rows = _checked_simplices(p, np.asarray(simplices), threads)
-        used = kernels.used_vertices(rows, len(p))
-        _check_coordinates(p, used)
-        topology = build_topology(p, rows, used, threads)
+        blocks = _blocks_of(cells)
+        topology: Topology
+        if isinstance(blocks, np.ndarray):
+            rows = _checked_simplices(p, blocks, threads)
+            used = kernels.used_vertices(rows, len(p))
+            _check_coordinates(p, used)
+            topology = build_topology(p, rows, used, threads)
+        else:
+            _check_shape(p)
+            checked = checked_blocks(blocks, *p.shape)
+            used = kernels.used_vertices(np.concatenate([rows.reshape(-1, 1) for _, rows in checked]), len(p))
+            _check_coordinates(p, used)
+            topology = build_mixed(p, checked, used, threads)
         movable = topology.used & ~topology.boundary
         if fixed is not None:
             movable &= ~np.asarray(fixed, dtype=bool)
@@ -108,37 +127,49 @@ class Mesh:
         return rows_of(values, self.topology.connectivity.vertices)
 
     def check(self, threads: int = 1) -> tuple[int, float]:
-        """Count the inverted simplices: those whose determinant is not positive beyond rounding.
+        """Count the inverted elements: those whose determinant is not positive everywhere, beyond rounding.
 
         Returns
         -------
         inverted : int
         smallest : float
-            The smallest signed area or volume of all simplices, in model units.
+            The smallest signed area or volume of all corner simplices, in model units.
         """
-        points, simplices = self.along_curve(self.points), self.topology.connectivity.simplices
-        inverted, smallest = kernels.check(points, simplices, threads)
+        inverted, smallest = Judged(self.topology.connectivity).check(self.along_curve(self.points), threads)
         return len(inverted), smallest
 
     def stuck(self, threads: int = 1) -> NDArray[np.int32]:
-        """Return the rows (k,), in the order of the connectivity, of the simplices that have no free vertex."""
+        """Return the rows (k,), in the order of the connectivity, of the elements that have no free vertex."""
         return self.topology.connectivity.stuck(self.along_curve(self.movable), threads)
 
     def mean_edge_length(self, threads: int = 1) -> float:
         """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
-        stars, points = self.topology.stars(threads), self.along_curve(self.points)
-        start = np.repeat(np.arange(len(points), dtype=np.int32), np.diff(stars.neighbour_offsets))
-        once = start < stars.neighbours
-        edges = points[stars.neighbours[once]] - points[start[once]]
-        return float(np.linalg.norm(edges, axis=1).mean())
+        self.topology.stars(threads)
+        points, (start, end) = self.along_curve(self.points), self.topology.edges()
+        return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
+
+
+def _blocks_of(cells: Any) -> NDArray[Any] | list[tuple[str, Any]]:
+    """Return an array of simplices, or several types of elements."""
+    if not (isinstance(cells, Sequence) and cells and isinstance(cells[0][0], str)):
+        return np.asarray(cells)
+    blocks = [(key, np.asarray(rows)) for key, rows in cells]
+    keys = {key for key, _ in blocks}
+    if len(keys) == 1 and keys <= {element.key for element in SIMPLICES.values()}:
+        return np.concatenate([rows for _, rows in blocks])
+    return blocks
+
+
+def _check_shape(points: NDArray[np.float64]) -> None:
+    if points.ndim != 2 or points.shape[1] not in (2, 3):
+        raise InvalidMeshError(f"points have the shape {points.shape}; (n, 2) or (n, 3) is needed")
 
 
 def _checked_simplices(
     points: NDArray[np.float64], simplices: NDArray[np.integer[Any]], threads: int
 ) -> NDArray[np.int32]:
     """Check shapes and indices; return the simplices as (m, d+1) int32."""
-    if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise InvalidMeshError(f"points have the shape {points.shape}; (n, 2) or (n, 3) is needed")
+    _check_shape(points)
     n, d = points.shape
     if simplices.ndim != 2 or simplices.shape[1] != d + 1 or simplices.dtype.kind not in "iu":
         raise InvalidMeshError(f"simplices have the shape {simplices.shape}; (m, {d + 1}) integers are needed")

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import SIMPLICES, Element
+from meshfix_cli.mesh.elements import SIMPLICES, Element, Shape
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -86,6 +86,13 @@ class Topology:
         """The type of the simplices."""
         return SIMPLICES[self.dimension]
 
+    def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the two ends (e,) of each edge, once, in the numbers of the connectivity."""
+        stars = self.stars()
+        start = np.repeat(np.arange(len(stars.vertices), dtype=np.int32), np.diff(stars.neighbour_offsets))
+        once = start < stars.neighbours
+        return start[once], stars.neighbours[once]
+
     def stars(self, threads: int = 1) -> kernels.Connectivity:
         """Return the connectivity with neighbours, faces and colours of blocks, made when they are first needed.
 
@@ -142,6 +149,12 @@ class Topology:
         return self.of_vertices(self.connectivity.boundary().view(bool))
 
     @cached_property
+    def inner(self) -> NDArray[np.bool_]:
+        """(m,) bool: simplices with a vertex that is not on the boundary."""
+        inner: NDArray[np.bool_] = (self.used & ~self.boundary)[self.simplices].any(axis=1)
+        return inner
+
+    @cached_property
     def mirrored(self) -> NDArray[np.bool_]:
         """(m,) bool: simplices of components whose numbering has, for most, the other orientation.
 
@@ -150,9 +163,8 @@ class Topology:
         if not self.flipped.any():
             return np.zeros(len(self.flipped), dtype=bool)
         votes = np.bincount(self.component, weights=self.flipped * 2.0 - 1.0)
-        inner = (self.used & ~self.boundary)[self.simplices].any(axis=1)
         # Without an inner vertex a part is its boundary: that may be tangled as well as mirrored, so all parts vote.
-        by_itself = np.bincount(self.component, weights=inner) > 0
+        by_itself = np.bincount(self.component, weights=self.inner) > 0
         return np.where(by_itself, votes > 0, votes.sum() > 0)[self.component]
 
     @cached_property
@@ -239,6 +251,16 @@ def read_only(array: NDArray[_T]) -> NDArray[_T]:
     return array
 
 
+def crowded_facet(shape: Shape, facet: list[int]) -> InvalidMeshError:
+    """Return the complaint about a facet of more than two elements."""
+    return InvalidMeshError(f"more than two {shape.plural} share the {shape.facet} {facet}: they overlap")
+
+
+def moebius(shape: Shape) -> InvalidMeshError:
+    """Return the complaint about elements that have no common orientation."""
+    return InvalidMeshError(f"the {shape.plural} form a Moebius band: no numbering makes all of them positive")
+
+
 def build_topology(
     points: NDArray[np.float64], simplices: NDArray[np.int32], used: NDArray[np.int32], threads: int
 ) -> Topology:
@@ -268,10 +290,9 @@ def build_topology(
         mesh = kernels.Connectivity(points, np.ascontiguousarray(simplices[source]), used, threads)
     if mesh.crowded >= 0:
         row, position = divmod(mesh.crowded, d + 1)
-        facet = np.delete(mesh.vertices[mesh.simplices[row]], position).tolist()
-        raise InvalidMeshError(f"more than two {shape.plural} share the {shape.facet} {facet}: they overlap")
+        raise crowded_facet(shape, np.delete(mesh.vertices[mesh.simplices[row]], position).tolist())
     if not mesh.orientable:
-        raise InvalidMeshError(f"the {shape.plural} form a Moebius band: no numbering makes all of them positive")
+        raise moebius(shape)
     flipped = mesh.against.astype(bool) ^ (mesh.signed_sizes(points) < 0)[mesh.component]
     rows = np.zeros_like(flipped)
     if flipped.any():

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.shape import Goal, shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
@@ -79,17 +80,18 @@ class Run:
         self.stars, self.max_move = mesh.topology.stars(threads), max_move
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
         stuck = mesh.stuck(threads)
-        fixed = self.stars.simplices[stuck]
-        inverted = kernels.check(self.points, fixed, threads)[0]
-        self.stuck = np.delete(fixed, inverted, axis=0)
-        self.mendable, self.own = self.stars.simplices, team.own_simplices
+        fixed = Judged(self.stars, stuck)
+        inverted = fixed.check(self.points, threads)[0]
+        self.stuck = fixed.without(inverted)
+        self.mendable, self.own = Judged(self.stars), team.own_elements
         lost = int(self.own[stuck[inverted]].sum())
         self.hopeless = np.zeros(len(self.mendable), dtype=bool) if hopeless is None else hopeless
         if len(inverted):
-            self.mendable = np.delete(self.mendable, stuck[inverted], axis=0)
+            self.mendable = self.mendable.without(stuck[inverted])
             self.own = np.delete(self.own, stuck[inverted])
             self.hopeless = np.delete(self.hopeless, stuck[inverted])
-        self.beyond_repair = team.total(lost), team.least(kernels.check(self.points, fixed[inverted], threads)[1])
+        smallest = Judged(self.stars, stuck[inverted]).check(self.points, threads)[1]
+        self.beyond_repair = team.total(lost), team.least(smallest)
         self.some_are_hopeless = team.total(int(self.hopeless.any())) > 0
         self.changed = np.zeros(len(self.points), dtype=bool)
         self._check()
@@ -109,7 +111,7 @@ class Run:
         self.untangling = 0  # sweeps
         share = self.left / max(1, self.team.total(int(self.own.sum())))
         self.many, self.most = share >= MANY, share >= MOST
-        # A valid mesh keeps its smallest measure; in others those of the inverted simplices were worse.
+        # A valid mesh keeps its smallest measure; in others those of the inverted elements were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
         self.floor = self.min_measure
 
@@ -226,8 +228,8 @@ class Run:
 
     def meets(self, degrees: float) -> bool:
         """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-        free = np.delete(self.stars.simplices, self.input.stuck(self.threads), axis=0)
-        return self._least(kernels.angles(self.points, free, self.threads)[0]) >= math.radians(degrees)
+        free = Judged(self.stars).without(self.input.stuck(self.threads))
+        return self._least(free.angles(self.points, self.threads)) >= math.radians(degrees)
 
     def go_back(self, untangling: bool) -> bool:
         """Return to the best positions; False: they are the last.
@@ -249,11 +251,11 @@ class Run:
         return True
 
     def _check(self) -> None:
-        """Find the inverted simplices, as rows of `mendable`, how many there are, and the smallest measure.
+        """Find the inverted elements, as positions in `mendable`, how many there are, and the smallest measure.
 
         `promising` is how many of them are worth the energy.
         """
-        self.inverted, smallest = kernels.check(self.points, self.mendable, self.threads)
+        self.inverted, smallest = self.mendable.check(self.points, self.threads)
         self.left = self.promising = self.team.total(int(self.own[self.inverted].sum()))
         if self.some_are_hopeless:
             own = self.own[self.inverted] & ~self.hopeless[self.inverted]
@@ -271,13 +273,13 @@ class Run:
         return self.team.total(int((vertices & self.team.own_vertices).sum()))
 
     def _broken(self) -> Mask:
-        """(n,) bool: the vertices of inverted simplices that can be mended."""
+        """(n,) bool: the vertices of inverted elements that can be mended."""
         return self._of(self.inverted)
 
-    def _of(self, simplices: NDArray[np.integer] | Mask) -> Mask:
-        """(n,) bool: the vertices of some simplices that can be mended."""
+    def _of(self, elements: NDArray[np.integer] | Mask) -> Mask:
+        """(n,) bool: the vertices of some elements that can be mended."""
         mask = np.zeros(len(self.points), dtype=bool)
-        mask[self.mendable[simplices]] = True
+        mask[self.mendable.vertices(elements)] = True
         return self.team.shared(mask)
 
     def _grown(self, vertices: Mask, rings: int) -> Mask:
@@ -396,15 +398,15 @@ class Run:
             )  # fmt: skip
         return points
 
-    def _min_sine2(self, simplices: NDArray[np.int32]) -> float:
-        return self.team.least(kernels.min_sine2(self.points, simplices, self.threads))
+    def _min_sine2(self, elements: Judged) -> float:
+        return self.team.least(elements.min_sine2(self.points, self.threads))
 
     def _angles(self, points: Array) -> Array:
-        """Return the smallest angle of each simplex that can be mended, in radians."""
-        return kernels.angles(points, self.mendable, self.threads)[0]
+        """Return the quality of each element that can be mended, an angle in radians."""
+        return self.mendable.angles(points, self.threads)
 
     def _steps(self, angles: Array) -> int:
-        """Return the sum of the own simplices' angles as an integer, which does not depend on the order."""
+        """Return the sum of the own elements' angles as an integer, which does not depend on the order."""
         return int((angles * ANGLE_STEPS).astype("i8")[self.own].sum())
 
     def _least(self, angles: Array) -> float:

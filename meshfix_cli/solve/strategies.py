@@ -34,6 +34,7 @@ class Move(IntEnum):
     MEAN_RATIO = 6
     RAISE_SMALLEST = 7
     COME_BACK = 8
+    UNTANGLE_COEFFICIENTS = 9
 
 
 Smooth = int | Literal["auto", "best"]

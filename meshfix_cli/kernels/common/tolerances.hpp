@@ -36,6 +36,9 @@ constexpr double SAME_SINE2 = 1e-12;   // by which a smallest sine^2 may differ 
 constexpr double NEWTON_PIVOT = 1e-8;  // of a diagonal element: below it the sum of mean ratios counts as not convex
 constexpr int NEWTON_TRIALS = 5;       // steps, each half as long as the one before
 
+// Steps of smoothing, each half as long as the one before, that are tried where an element would not be valid inside.
+constexpr int GUARD_TRIALS = 4;
+
 // Of the way back: smaller shares are not worth a step, and would have no end.
 constexpr double LEAST_SHARE = 0.01;
 

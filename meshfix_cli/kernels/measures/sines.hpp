@@ -42,15 +42,57 @@ inline double barely_min_sine2(const Corners<D>& p, double unit) {
     return is_barely_valid<D>(p, unit) ? min_sine2(sharpest_edges<D>(p, product), false) : -1.0;
 }
 
+// The square of the scaled Jacobian at the corner of an element; with `plain` -1 or NaN as above. Edges lead from the free
+// vertex, `corner` tells where the corner is: see `Roles`.
+template <int D, class T>
+inline T corner_sine2(const Edges<D, T>& e, T corner, T weight, bool plain) {
+    const T det = determinant(e);
+    T longest = norm2(e[0]), product = norm2(e[0]);
+    for (int k = 1; k < D; ++k) {
+        product = product * norm2(e[k]);
+        longest = larger(longest, norm2(e[k]));
+    }
+    for (int k = 0; k < D; ++k) {
+        T there = norm2(e[k]);
+        for (int l = 0; l < D; ++l)
+            if (l != k) there = there * norm2(e[l] - e[k]);
+        product = select(corner > constant<T>(1.5 + k), there, product);
+    }
+    const T sine2 = weight * weight * det * det / product;
+    return plain ? select(is_plainly_valid<D>(det, constant<T>(4.0) * longest), sine2, constant<T>(-1.0)) : sine2;
+}
+
+// Of a corner that a quick look does not tell to be valid.
+template <int D>
+inline double barely_corner_sine2(const Star<D>& star, std::size_t block, int lane, const Vec<D>& x) {
+    const Edges<D> e = star.edges(star.face_of(block, lane), x);
+    const Roles<D>& roles = star.roles[block];
+    return corner_sine2<D>(e, roles.corner[lane], roles.weight[lane], false);
+}
+
+// (smallest sine)^2 of the lanes of a block, or that of the scaled Jacobian where they are corners of elements.
+template <int D>
+inline Pack min_sine2_of(const Star<D>& star, std::size_t b, const Edges<D, Pack>& e) {
+    if (star.roles.empty()) return min_sine2(e, true);
+    const Roles<D>& roles = star.roles[b];
+    const Pack corner = corner_sine2<D>(e, roles.corner, roles.weight, true);
+    const auto is_corner = roles.corner > constant<Pack>(0.5);
+    return all(is_corner) ? corner : select(is_corner, corner, min_sine2(e, true));
+}
+
 // The smallest over the star at x; as soon as it is not above `floor` the rest is not looked at and -1 returned.
 template <int D>
 double min_sine2(const Star<D>& star, const Vec<D>& x, double floor) {
     double smallest = INFINITY;
     for (std::size_t b = 0; b < star.blocks.size(); ++b) {
-        const Pack lanes = min_sine2(star.edges(star.blocks[b], x), true);
+        const Pack lanes = min_sine2_of(star, b, star.edges(star.blocks[b], x));
         for (int i = 0; i < LANES; ++i) {
             double lane = lanes[i];
-            if (!(lane > 0.0) && star.valid_face(b, i, x)) lane = barely_min_sine2<D>(star.corners(star.face_of(b, i), x), 1.0);
+            if (!(lane > 0.0) && star.valid_face(b, i, x)) {
+                const bool is_corner = !star.roles.empty() && star.roles[b].corner[i] > 0.5;
+                lane = is_corner ? barely_corner_sine2<D>(star, b, i, x)
+                                 : barely_min_sine2<D>(star.corners(star.face_of(b, i), x), 1.0);
+            }
             if (!(lane > floor)) return -1.0;
             smallest = std::min(smallest, lane);
         }
@@ -119,12 +161,48 @@ inline void sines(const Edges<3, T>& e, Sine<3, T>* out) {
     pair(c, square_root(norm2(B - A)), na, nb, nc);
 }
 
-// All sines of the star at x: functions_per_simplex(D) for each block of faces.
+// The scaled Jacobian at the corner of an element: sine = weight det / (product of the edges there).
+template <int D>
+inline Sine<D, Pack> corner_sine(const Edges<D, Pack>& e, const Roles<D>& roles) {
+    const Pack det = determinant(e);
+    Pack product2 = norm2(e[0]);
+    Vec<D, Pack> log_gradient = (constant<Pack>(1.0) / det) * determinant_slope(e), there{};
+    for (int k = 1; k < D; ++k) product2 = product2 * norm2(e[k]);
+    for (int k = 0; k < D; ++k) there = there + (constant<Pack>(1.0) / norm2(e[k])) * e[k];
+    for (int k = 0; k < D; ++k) {
+        const auto is_here = roles.corner > constant<Pack>(1.5 + k);
+        const Pack length2 = norm2(e[k]);
+        Pack those = length2;
+        for (int l = 0; l < D; ++l)
+            if (l != k) those = those * norm2(e[l] - e[k]);
+        product2 = select(is_here, those, product2);
+        for (int c = 0; c < D; ++c) there[c] = select(is_here, e[k][c] / length2, there[c]);
+    }
+    log_gradient = log_gradient + there;
+    const Pack value = roles.weight * det / square_root(product2);
+    return {value, value * log_gradient};
+}
+
+// All sines of the star at x: functions_per_simplex(D) for each block of faces. Of corners the first is the scaled
+// Jacobian, and the others are never the smallest.
 template <int D>
 void sines(const Star<D>& star, const Vec<D>& x, std::vector<Sine<D, Pack>>& out) {
-    out.resize(star.blocks.size() * functions_per_simplex(D));
-    for (std::size_t b = 0; b < star.blocks.size(); ++b)
-        sines(star.edges(star.blocks[b], x), &out[b * functions_per_simplex(D)]);
+    constexpr int COUNT = functions_per_simplex(D);
+    out.resize(star.blocks.size() * COUNT);
+    for (std::size_t b = 0; b < star.blocks.size(); ++b) {
+        const Edges<D, Pack> e = star.edges(star.blocks[b], x);
+        Sine<D, Pack>* const here = &out[b * COUNT];
+        sines(e, here);
+        if (star.roles.empty()) continue;
+        const auto is_corner = star.roles[b].corner > constant<Pack>(0.5);
+        const Sine<D, Pack> corner = corner_sine<D>(e, star.roles[b]);
+        const Pack none = constant<Pack>(0.0);
+        for (int i = 0; i < COUNT; ++i) {
+            here[i].value = select(is_corner, i == 0 ? corner.value : constant<Pack>(INFINITY), here[i].value);
+            for (int c = 0; c < D; ++c)
+                here[i].gradient[c] = select(is_corner, i == 0 ? corner.gradient[c] : none, here[i].gradient[c]);
+        }
+    }
 }
 
 }  // namespace meshfix

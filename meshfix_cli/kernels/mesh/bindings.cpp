@@ -36,6 +36,29 @@ void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
     });
 }
 
+void init_elements(PyConnectivity* self, const Matrix<const double>& points, const Vector<const std::uint8_t>& codes,
+                   const Vector<const std::int32_t>& nodes, const Vector<const std::int32_t>& used, int threads) {
+    new (self) PyConnectivity();
+    self->dimension = static_cast<int>(points.shape(1));
+    self->mesh = with_dimension(points.shape(1), [&](auto d) {
+        return connect_elements<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), codes.data(), nodes.data(),
+                                   static_cast<std::int64_t>(codes.shape(0)),
+                                   std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
+    });
+}
+
+void take_apart_py(PyConnectivity& self, const Vector<const bool>& flipped, int threads) {
+    const std::uint8_t* mask = bytes_of(flipped, self.mesh.m());
+    with_dimension(self.dimension, [&](auto d) { take_apart<d>(self.mesh, mask, threads); });
+}
+
+template <auto Member>
+auto element_view(PyConnectivity& self) {
+    auto& values = self.mesh.elements.*Member;
+    using T = typename std::remove_reference_t<decltype(values)>::value_type;
+    return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+}
+
 PyConnectivity* part_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
     auto self = std::make_unique<PyConnectivity>();
     self->dimension = static_cast<int>(simplices.shape(1)) - 1;
@@ -108,6 +131,7 @@ auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int ri
 auto stuck_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
     const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
     return to_numpy(with_dimension(self.dimension, [&](auto d) {
+        if (!self.mesh.elements.empty()) return stuck_elements(self.mesh.elements, mask);
         return stuck_simplices<d>(self.mesh.simplices.data(), self.mesh.m(), mask, threads);
     }));
 }
@@ -117,9 +141,11 @@ auto boundary_py(const PyConnectivity& self) {
     return to_numpy(with_dimension(self.dimension, [&](auto d) { return boundary_vertices<d>(self.mesh); }));
 }
 
-auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads) {
+auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movable, int threads, bool other_diagonal) {
     const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
     FixedFacets found = with_dimension(self.dimension, [&](auto d) {
+        if (!self.mesh.elements.empty())
+            return fixed_facets<d>(self.mesh.elements, self.mesh.mates, mask, other_diagonal);
         return fixed_facets<d>(self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), mask, threads);
     });
     return std::make_tuple(to_numpy(std::move(found.vertices), static_cast<std::size_t>(self.dimension)),
@@ -231,6 +257,17 @@ void bind_mesh(nb::module_& m) {
     nb::class_<PyConnectivity>(m, "Connectivity")
         .def("__init__", &init_connectivity, "points"_a.noconvert(), "simplices"_a.noconvert(), "used"_a.noconvert(),
              "threads"_a)
+        .def("__init__", &init_elements, "points"_a.noconvert(), "codes"_a.noconvert(), "nodes"_a.noconvert(),
+             "used"_a.noconvert(), "threads"_a)
+        .def("take_apart", &take_apart_py, "flipped"_a.noconvert(), "threads"_a)
+        .def_prop_ro("codes", &element_view<&Elements::codes>)
+        .def_prop_ro("node_offsets", &element_view<&Elements::offsets>)
+        .def_prop_ro("nodes", &element_view<&Elements::nodes>)
+        .def_prop_ro("facet_offsets", &element_view<&Elements::facet_offsets>)
+        .def_prop_ro("facet_owners", &element_view<&Elements::facet_owners>)
+        .def_prop_ro("simplex_offsets", &element_view<&Elements::simplex_offsets>)
+        .def_prop_ro("owners", &element_view<&Elements::owners>)
+        .def_prop_ro("facet_mates", &view<&Connectivity::mates>)
         .def("__getstate__", &state_of)
         .def("__setstate__", &restore)
         .def_static("part", &part_py, "simplices"_a.noconvert(), "n"_a, "threads"_a)
@@ -240,7 +277,7 @@ void bind_mesh(nb::module_& m) {
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
         .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)
         .def("boundary", &boundary_py)
-        .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a)
+        .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a, "other_diagonal"_a = false)
         .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })
         .def_prop_ro("orientable", [](PyConnectivity& self) { return self.mesh.orientable; })
         .def_prop_ro("simplices", &rows_view<&Connectivity::simplices>)

@@ -29,7 +29,8 @@ void check_points(const Matrix<T>& points, const PyConnectivity& self) {
 }
 
 inline StarsView stars_of(const Connectivity& mesh) {
-    return {mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(), mesh.neighbours.data()};
+    return {mesh.offsets.data(), mesh.faces.data(), mesh.neighbour_offsets.data(), mesh.neighbours.data(),
+            mesh.corners.data(), mesh.elements.empty() ? nullptr : &mesh.elements};
 }
 
 }  // namespace meshfix

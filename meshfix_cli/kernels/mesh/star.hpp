@@ -13,16 +13,23 @@
 #include <cstdint>
 #include <vector>
 
+#include "mesh/elements.hpp"
 #include "mesh/simplex.hpp"
 
 namespace meshfix {
 
-// Views of the arrays of stars.hpp.
+// Views of the arrays of stars.hpp; no elements: all are simplices.
 struct StarsView {
     const std::int32_t* offsets;
     const std::uint16_t* faces;
     const std::int32_t* neighbour_offsets;
     const std::int32_t* neighbours;
+    const std::int32_t* corners;
+    const Elements* elements;
+
+    std::int32_t element_of(std::int32_t corner, int corners_per_simplex) const {
+        return elements->owners[corner / corners_per_simplex];
+    }
 };
 
 // Mean of the neighbours of v, summed as differences: at a far offset the sum itself would lose digits.
@@ -40,10 +47,20 @@ inline Vec<D> centroid(const StarsView& stars, const double* points, std::int64_
 template <int D>
 using FaceBlock = Edges<D, Pack>;
 
+// What LANES faces are where the elements are not all simplices: a whole simplex, or the corner of an element.
+template <int D>
+struct Roles {
+    Pack corner;         // where it is: 0: nowhere, the simplex is an element; 1: the free vertex; 2 + k: vertex k
+    Pack weight;         // of the scaled Jacobian
+    Vec<D, Pack> pull;   // weights of the squared edges from the free vertex in |A W^-1|^2, see shapes.hpp
+    Pack held;           // what the edges of the face add to that
+};
+
 template <int D>
 struct Star {
     std::vector<Vec<D>> neighbours;
     std::vector<FaceBlock<D>> blocks;
+    std::vector<Roles<D>> roles;  // of the blocks; empty: all are simplices
     const std::uint16_t* faces = nullptr;
     int faces_count = 0;
     Vec<D> origin{}, position{};
@@ -68,16 +85,51 @@ struct Star {
         for (auto& p : neighbours) p = scale * p;
         position = scale * (load<D>(points + v * D) - origin);
         fill_blocks();
+        if (stars.elements != nullptr) set_roles(stars, v);
+    }
+
+    void set_roles(const StarsView& stars, std::int64_t v) {
+        roles.resize(blocks.size());
+        for (int i = 0; i < static_cast<int>(roles.size()) * LANES; ++i) {
+            const std::int32_t corner = stars.corners[stars.offsets[v] + std::min(i, faces_count - 1)];
+            const int position_of_free = corner % (D + 1);
+            const Shape& shape = stars.elements->shape(stars.element_of(corner, D + 1));
+            Roles<D>& role = roles[i / LANES];
+            const int lane = i % LANES;
+            const auto& face = opposite_face<D>(position_of_free);
+            role.weight[lane] = shape.weight;
+            role.corner[lane] = 0.0;
+            if (shape.simplices > 1) role.corner[lane] = position_of_free == 0 ? 1.0 : 0.0;
+            role.held[lane] = 0.0;
+            for (int k = 0; k < D; ++k) {
+                if (shape.simplices > 1 && face[k] == 0) role.corner[lane] = 2.0 + k;
+                role.pull[k][lane] = edge_weight(shape, position_of_free, face[k]);
+                for (int l = 0; l < k; ++l) {
+                    const Vec<D> edge = neighbours[faces[face_at(i) + k]] - neighbours[faces[face_at(i) + l]];
+                    role.held[lane] += edge_weight(shape, face[k], face[l]) * norm2(edge);
+                }
+            }
+        }
+    }
+
+    // The weight of a squared edge in the sum over G_ij a_i.a_j, the a_i from position 0 of a corner simplex.
+    static double edge_weight(const Shape& shape, int i, int j) {
+        if (i > 0 && j > 0) return -shape.gram[i - 1][j - 1];
+        const int k = std::max(i, j) - 1;
+        return shape.gram[k][0] + shape.gram[k][1] + shape.gram[k][2];
     }
 
     void fill_blocks() {
         blocks.resize((faces_count + LANES - 1) / LANES);
         for (int i = 0; i < static_cast<int>(blocks.size()) * LANES; ++i) {
-            const std::uint16_t* face = faces + std::min(i, faces_count - 1) * D;
+            const std::uint16_t* face = faces + face_at(i);
             for (int k = 0; k < D; ++k)
                 for (int c = 0; c < D; ++c) blocks[i / LANES][k][c][i % LANES] = neighbours[face[k]][c];
         }
     }
+
+    // Where in `faces` that of a lane begins; behind the end, the last one.
+    int face_at(int i) const { return std::min(i, faces_count - 1) * D; }
 
     // 1 for the faces of a block, 0 for what fills up the last one.
     Pack weights(std::size_t block) const {
@@ -89,6 +141,14 @@ struct Star {
 
     Vec<D> to_global(const Vec<D>& x) const { return origin + unit * x; }
     Vec<D> to_local(const Vec<D>& p) const { return (1.0 / unit) * (p - origin); }
+
+    // |A W^-1|^2 of each lane of a block, but for a constant where all are simplices.
+    Pack squared_edges(std::size_t b, const Edges<D, Pack>& e) const {
+        if (roles.empty()) return sum_of_squared_edges<D>(e);
+        Pack sum = roles[b].held;
+        for (int k = 0; k < D; ++k) sum += roles[b].pull[k] * norm2(e[k]);
+        return sum;
+    }
 
     // The nearest position that the global coordinates can hold: what is judged is what will be stored.
     Vec<D> snap(const Vec<D>& x) const { return to_local(to_global(x)); }

@@ -4,6 +4,9 @@
 // vertices, rows, simplices        see order.hpp; all other numbers are those of this order
 // offsets (n+1), corners           the corners at each vertex; a corner is simplex * (D+1) + position
 // mates, component, against        see facets.hpp
+// elements                         see elements.hpp; empty where all are simplices. Where it is not, `rows`, `component`,
+//                                  `against` and `mates` are of the elements and their facets, and `simplices`,
+//                                  `offsets` and `corners` of their corner simplices, once they are taken apart
 // neighbour_offsets (n+1), neighbours
 // faces (m*(D+1), D)               for each of `corners` the opposite face, as positions in the vertex's neighbours
 // colour_offsets, colour_blocks    blocks of one colour share no edge; block b holds the vertices from b * BLOCK_SIZE
@@ -15,6 +18,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "mesh/elements.hpp"
 #include "mesh/facets.hpp"
 #include "mesh/order.hpp"
 
@@ -27,6 +31,7 @@ struct Connectivity {
     bool orientable = true;
     std::vector<std::int32_t> neighbour_offsets, neighbours, colour_offsets, colour_blocks;
     std::vector<std::uint16_t> faces;
+    Elements elements;
 
     std::int64_t n() const { return static_cast<std::int64_t>(vertices.size()); }
     std::int64_t m() const { return static_cast<std::int64_t>(rows.size()); }
@@ -37,6 +42,13 @@ struct Connectivity {
 template <int D>
 std::vector<std::uint8_t> boundary_vertices(const Connectivity& mesh) {
     std::vector<std::uint8_t> marked(static_cast<std::size_t>(mesh.n()), 0);
+    if (!mesh.elements.empty()) {
+        for_each_facet(mesh.elements, [&](std::int32_t f) { return mesh.mates[f] < 0; },
+                       [&](std::int32_t, std::int32_t, const std::array<std::int32_t, 4>& v, int size) {
+                           for (int i = 0; i < size; ++i) marked[v[i]] = 1;
+                       });
+        return marked;
+    }
     for (std::size_t corner = 0; corner < mesh.mates.size(); ++corner) {
         if (mesh.mates[corner] >= 0) continue;
         const std::int32_t* simplex = mesh.simplices.data() + corner / (D + 1) * (D + 1);
@@ -67,6 +79,38 @@ Connectivity connect(const double* points, std::int64_t n, const std::int32_t* s
     return mesh;
 }
 
+// Elements of any shapes: all but their corner simplices.
+template <int D>
+Connectivity connect_elements(const double* points, std::int64_t n, const std::uint8_t* codes, const std::int32_t* nodes,
+                              std::int64_t m, std::vector<std::int32_t> used, int threads) {
+    Connectivity mesh;
+    mesh.vertices = std::move(used);
+    sort_along_curve<D>(mesh.vertices, points, threads);
+    std::vector<std::int32_t> number(n);
+    for (std::size_t i = 0; i < mesh.vertices.size(); ++i) number[mesh.vertices[i]] = static_cast<std::int32_t>(i);
+    mesh.elements = ordered_elements(codes, nodes, m, number, mesh.n(), mesh.rows);
+    Facets facets = match_facets(mesh.elements, mesh.n(), threads);
+    mesh.crowded = facets.crowded;
+    if (mesh.crowded >= 0) return mesh;
+    Orientation orientation = orient(mesh.elements, facets);
+    mesh.mates = std::move(facets.mates);
+    mesh.component = std::move(orientation.component);
+    mesh.against = std::move(orientation.against);
+    mesh.orientable = orientation.orientable;
+    return mesh;
+}
+
+// Gives some elements (m) the other orientation, and takes all apart into their corner simplices.
+template <int D>
+void take_apart(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
+    mirror(mesh.elements, mesh.mates, flipped);
+    mesh.simplices = corner_simplices<D>(mesh.elements, threads);
+    const auto count = static_cast<std::int64_t>(mesh.simplices.size()) / (D + 1);
+    Incidence csr = incidence<D>(mesh.simplices.data(), count, mesh.n(), threads);
+    mesh.offsets = std::move(csr.offsets);
+    mesh.corners = std::move(csr.corners);
+}
+
 // A part of a mesh that has an order already: its vertices and simplices, as they come.
 template <int D>
 Connectivity part_of_mesh(const std::int32_t* simplices, std::int64_t m, std::int64_t n, int threads) {
@@ -82,11 +126,36 @@ Connectivity part_of_mesh(const std::int32_t* simplices, std::int64_t m, std::in
     return part;
 }
 
+// Signed sizes, times d!, of the components as their elements are numbered together; see below. What is inside of a
+// quadrilateral that is not flat is the mean of what is inside of its triangles by either diagonal.
+template <int D>
+std::vector<double> signed_sizes_of_elements(const Connectivity& mesh, const double* points) {
+    const auto at = [&](std::int32_t v) { return load<D>(points + static_cast<std::int64_t>(mesh.vertices[v]) * D); };
+    const auto components = static_cast<std::size_t>(*std::max_element(mesh.component.begin(), mesh.component.end())) + 1;
+    std::vector<double> sizes(components, 0.0);
+    std::vector<std::int32_t> origins(components, -1);
+    const auto add = [&](std::int32_t e, std::int32_t, const std::array<std::int32_t, 4>& v, int size) {
+        const std::int32_t component = mesh.component[e];
+        if (origins[component] < 0) origins[component] = v[0];
+        const Vec<D> origin = at(origins[component]);
+        const double share = mesh.against[e] ? -0.5 : 0.5;
+        for (const bool other : {false, true})
+            for_each_part_of_facet<D>(v, size, other, [&](const std::array<std::int32_t, D>& part) {
+                Edges<D> edges;
+                for (int k = 0; k < D; ++k) edges[k] = at(part[k]) - origin;
+                sizes[component] += share * determinant(edges);
+            });
+    };
+    for_each_facet(mesh.elements, [&](std::int32_t f) { return mesh.mates[f] < 0; }, add);
+    return sizes;
+}
+
 // Signed sizes, times d!, of the components as their simplices are numbered together: those of the boundary facets seen
 // from one of its vertices. Where inner vertices are does not matter: one that is far away would drown a sum over the
 // simplices in rounding. points (n, D) in the user's order
 template <int D>
 std::vector<double> signed_sizes(const Connectivity& mesh, const double* points) {
+    if (!mesh.elements.empty()) return signed_sizes_of_elements<D>(mesh, points);
     const auto at = [&](std::int32_t v) { return load<D>(points + static_cast<std::int64_t>(mesh.vertices[v]) * D); };
     std::vector<double> sizes;
     std::vector<Vec<D>> origins;
@@ -200,6 +269,20 @@ void build_neighbours(Connectivity& mesh, int threads) {
     });
 }
 
+// Adds the blocks before each that have a vertex of one of its elements: not all of these are neighbours.
+inline void add_blocks_of_elements(const Elements& elements, std::vector<std::vector<std::int32_t>>& touching) {
+    for (std::int64_t e = 0; e < elements.size(); ++e) {
+        const std::int32_t* nodes = elements.nodes_of(e);
+        for (int i = 0; i < elements.shape(e).nodes; ++i)
+            for (int j = 0; j < i; ++j) {
+                const auto one = static_cast<std::int32_t>(nodes[i] / BLOCK_SIZE), other = static_cast<std::int32_t>(nodes[j] / BLOCK_SIZE);
+                if (one == other) continue;
+                auto& others = touching[std::max(one, other)];
+                if (others.empty() || others.back() != std::min(one, other)) others.push_back(std::min(one, other));
+            }
+    }
+}
+
 // Greedy, in the order of the blocks.
 inline void colour_blocks(Connectivity& mesh, int threads) {
     std::vector<std::vector<std::int32_t>> touching(mesh.blocks());  // the blocks before each that touch it
@@ -210,6 +293,7 @@ inline void colour_blocks(Connectivity& mesh, int threads) {
             if (other < block && (others.empty() || others.back() != other)) others.push_back(other);
         }
     });
+    add_blocks_of_elements(mesh.elements, touching);
     std::vector<std::int32_t> colour(mesh.blocks()), forbidden_by;
     for (std::int32_t block = 0; block < mesh.blocks(); ++block) {
         for (std::int32_t other : touching[block]) forbidden_by[colour[other]] = block;
@@ -236,7 +320,8 @@ void build_stars(Connectivity& mesh, int threads) {
 template <int D>
 void grow(const Connectivity& mesh, std::vector<std::uint8_t>& marked) {
     const std::vector<std::uint8_t> before = marked;
-    for (std::int64_t s = 0; s < mesh.m(); ++s) {
+    const auto count = static_cast<std::int64_t>(mesh.simplices.size()) / (D + 1);
+    for (std::int64_t s = 0; s < count; ++s) {
         const std::int32_t* simplex = &mesh.simplices[s * (D + 1)];
         bool any = false;
         for (int k = 0; k <= D; ++k) any |= before[simplex[k]] != 0;

@@ -276,7 +276,7 @@ void bind_moves(nb::module_& m) {
         .def_prop_ro("evaluations",
                      [](PyFoldover& self) { return self.with_problem([](auto& p) { return p.evaluations(); }); });
 
-    static_assert(static_cast<int>(Move::come_back) == 8, "the codes of strategies.Move");
+    static_assert(static_cast<int>(Move::untangle_coefficients) == 9, "the codes of strategies.Move");
 }
 
 }  // namespace meshfix

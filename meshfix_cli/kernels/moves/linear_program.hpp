@@ -22,6 +22,13 @@ namespace meshfix {
 
 enum class LpStatus { optimal, degenerate, failed };
 
+// A function of the position: value + gradient . x.
+template <int D>
+struct Affine {
+    double value;
+    Vec<D> gradient;
+};
+
 // Columns are numbered: the faces, in the blocks of the star (its last face may stand there twice, which changes
 // nothing), then +e_0, -e_0, +e_1, ...
 template <int D>
@@ -44,13 +51,7 @@ struct LinearProgram {
 
     // Takes the columns from a star; `heights`: divided by |n_i|.
     void set(const Star<D>& star, bool heights) {
-        normals.resize(star.blocks.size());
-        costs.resize(star.blocks.size());
-        box = LP_BOX * star.radius;
-        faces = star.faces_count;
-        faces_count = static_cast<int>(star.blocks.size()) * LANES;
-        set_frame(star.neighbours);
-        Pack shortest = constant<Pack>(INFINITY), longest = constant<Pack>(0.0);
+        resize(star, star.faces_count);
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto& p = star.blocks[b];
             costs[b] = determinant(p);
@@ -59,21 +60,20 @@ struct LinearProgram {
             } else {
                 normals[b] = turned(cross(p[1] - p[0], p[2] - p[0]));
             }
-            shortest = smaller(shortest, norm2(normals[b]));
-            longest = larger(longest, norm2(normals[b]));
         }
-        double shortest2 = INFINITY, longest2 = 0.0;
-        for (int i = 0; i < LANES; ++i) {
-            shortest2 = std::min(shortest2, shortest[i]);
-            longest2 = std::max(longest2, longest[i]);
+        settle(heights);
+    }
+
+    // Takes other affine functions of the position, `count` values at the origin and their gradients.
+    void set(const Star<D>& star, const std::vector<Affine<D>>& functions, bool heights) {
+        const int count = static_cast<int>(functions.size());
+        resize(star, count);
+        for (int i = 0; i < faces_count; ++i) {
+            const Affine<D>& f = functions[std::min(i, count - 1)];
+            costs[i / LANES][i % LANES] = f.value;
+            for (int k = 0; k < D; ++k) normals[i / LANES][k][i % LANES] = -dot(frame[k], f.gradient);
         }
-        stand_in = -1;
-        if (!(shortest2 > LP_DROPPED_FACE2 * longest2)) drop_faces(LP_DROPPED_FACE2 * longest2);
-        if (heights && longest2 > 0.0) divide_by_areas();
-        Pack cost = constant<Pack>(box);
-        for (const Pack& c : costs) cost = larger(cost, larger(c, c * constant<Pack>(-1.0)));
-        largest_cost = box;
-        for (int i = 0; i < LANES; ++i) largest_cost = std::max(largest_cost, cost[i]);
+        settle(heights);
     }
 
     // The smallest determinant or height is pi[D].
@@ -112,6 +112,36 @@ struct LinearProgram {
     double weight(int row) const { return inverse[row][D]; }
 
    private:
+    void resize(const Star<D>& star, int count) {
+        faces = count;
+        const int blocks = (count + LANES - 1) / LANES;
+        faces_count = blocks * LANES;
+        normals.resize(blocks);
+        costs.resize(blocks);
+        box = LP_BOX * star.radius;
+        set_frame(star.neighbours);
+    }
+
+    void settle(bool heights) {
+        Pack shortest = constant<Pack>(INFINITY), longest = constant<Pack>(0.0);
+        for (const auto& normal : normals) {
+            shortest = smaller(shortest, norm2(normal));
+            longest = larger(longest, norm2(normal));
+        }
+        double shortest2 = INFINITY, longest2 = 0.0;
+        for (int i = 0; i < LANES; ++i) {
+            shortest2 = std::min(shortest2, shortest[i]);
+            longest2 = std::max(longest2, longest[i]);
+        }
+        stand_in = -1;
+        if (!(shortest2 > LP_DROPPED_FACE2 * longest2)) drop_faces(LP_DROPPED_FACE2 * longest2);
+        if (heights && longest2 > 0.0) divide_by_areas();
+        Pack cost = constant<Pack>(box);
+        for (const Pack& c : costs) cost = larger(cost, larger(c, c * constant<Pack>(-1.0)));
+        largest_cost = box;
+        for (int i = 0; i < LANES; ++i) largest_cost = std::max(largest_cost, cost[i]);
+    }
+
     // The first neighbour that is far from the centroid, the first that is far from that line.
     void set_frame(const std::vector<Vec<D>>& neighbours) {
         frame[0] = first_far(neighbours, Vec<D>{});

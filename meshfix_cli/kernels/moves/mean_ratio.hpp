@@ -23,6 +23,13 @@ struct MeanRatio {
     Vec<D> gradient{};
     std::array<Vec<D>, D> hessian{};  // its lower triangle
 
+    // What a lane counts: those of different shapes are comparable, since that of the ideal one is 1.
+    static Pack weights(const Star<D>& star, std::size_t b) {
+        if (star.roles.empty()) return star.weights(b);
+        const Pack det = star.roles[b].weight;
+        return star.weights(b) * (constant<Pack>(D == 2 ? 1.0 / 4 : 1.0 / 27) / (det * det));
+    }
+
     // The sum over a star at x; infinite where a determinant is not positive.
     static double at(const Star<D>& star, const Vec<D>& x) {
         LaneSum sum;
@@ -31,7 +38,7 @@ struct MeanRatio {
             const auto e = star.edges(star.blocks[b], x);
             const Pack det = determinant(e);
             smallest = smaller(smallest, det);
-            sum.add(b, star.weights(b) * powered_ratio<D>(sum_of_squared_edges<D>(e), det));
+            sum.add(b, weights(star, b) * powered_ratio<D>(star.squared_edges(b, e), det));
         }
         for (int i = 0; i < LANES; ++i)
             if (!(smallest[i] > 0.0)) return INFINITY;
@@ -46,17 +53,28 @@ struct MeanRatio {
         std::array<std::array<LaneSum, D>, D> curvature;
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto e = star.edges(star.blocks[b], x);
-            const Pack edges2 = sum_of_squared_edges<D>(e), det = determinant(e);
-            const Pack f = star.weights(b) * powered_ratio<D>(edges2, det), pf = p * f;
+            const Pack edges2 = star.squared_edges(b, e), det = determinant(e);
+            const Pack f = weights(star, b) * powered_ratio<D>(edges2, det), pf = p * f;
             Vec<D, Pack> outward = e[0];
-            for (int k = 1; k < D; ++k) outward = outward + e[k];
+            Pack pulls = constant<Pack>(D);
+            if (star.roles.empty()) {
+                for (int k = 1; k < D; ++k) outward = outward + e[k];
+            } else {
+                const Vec<D, Pack>& pull = star.roles[b].pull;
+                outward = pull[0] * e[0];
+                pulls = pull[0];
+                for (int k = 1; k < D; ++k) {
+                    outward = outward + pull[k] * e[k];
+                    pulls += pull[k];
+                }
+            }
             const Vec<D, Pack> s = (constant<Pack>(-2.0) / edges2) * outward;
             const Vec<D, Pack> n = (constant<Pack>(1.0) / det) * determinant_slope(e);
             const Vec<D, Pack> u = s - constant<Pack>(2.0 / D) * n;
             sum.add(b, f);
             for (int i = 0; i < D; ++i) {
                 slope[i].add(b, pf * u[i]);
-                curvature[i][i].add(b, pf * (constant<Pack>(2.0 * D) / edges2));
+                curvature[i][i].add(b, pf * (2.0 * pulls / edges2));
                 for (int j = 0; j <= i; ++j)
                     curvature[i][j].add(b, pf * (p * u[i] * u[j] - s[i] * s[j] + 2.0 / D * n[i] * n[j]));
             }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "common/parallel.hpp"
+#include "measures/bezier.hpp"
 #include "mesh/order.hpp"
 #include "moves/active_set.hpp"
 #include "moves/come_back.hpp"
@@ -14,7 +15,7 @@ namespace meshfix {
 
 enum class Move : int {
     laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
-    come_back
+    come_back, untangle_coefficients
 };
 
 struct Parameters {
@@ -50,6 +51,77 @@ struct Relocation {
     Star<D> star{};
     LinearProgram<D> program{};
     ActiveSet<D> active_set{};
+    std::vector<Affine<D>> functions{};
+
+    // Calls f(code, nodes, position of v) for each element of v whose corners do not say all, its nodes in the local frame.
+    template <class F>
+    void for_each_curved(std::int64_t v, const F& f) const {
+        std::int32_t last = -1;
+        for (std::int32_t i = stars.offsets[v]; i < stars.offsets[v + 1]; ++i) {  // elements lie one behind the other
+            const std::int32_t e = stars.element_of(stars.corners[i], D + 1);
+            if (std::exchange(last, e) == e || stars.elements->codes[e] < WEDGE) continue;
+            std::array<Vec<D>, MOST_NODES> nodes;
+            int here = 0;
+            for (int k = 0; k < stars.elements->shape(e).nodes; ++k) {
+                const std::int64_t node = stars.elements->nodes_of(e)[k];
+                nodes[k] = star.to_local(load<D>(points + node * D));
+                if (node == v) here = k;
+            }
+            f(stars.elements->codes[e], nodes, here);
+        }
+    }
+
+    // The last point on the way from the position to x, halved a few times, where no element is lost that was valid inside.
+    Vec<D> guarded(std::int64_t v, const Vec<D>& x) const {
+        if constexpr (D == 2) return x;
+        if (stars.elements == nullptr) return x;
+        Vec<D> trial = x;
+        for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings, trial = star.snap(star.position + 0.5 * (trial - star.position)))
+            if (loses_nothing(v, trial)) return trial;
+        return star.position;
+    }
+
+    bool loses_nothing(std::int64_t v, const Vec<D>& x) const {
+        bool lost = false;
+        for_each_curved(v, [&](std::uint8_t code, std::array<Vec<D>, MOST_NODES>& nodes, int here) {
+            if constexpr (D == 3) {
+                if (lost) return;
+                const Vec<D> before = std::exchange(nodes[here], x);
+                if (is_certified(code, nodes.data())) return;
+                nodes[here] = before;
+                lost = is_certified(code, nodes.data());
+            }
+        });
+        return !lost;
+    }
+
+    // The programme of the paper with the Bezier coefficients of the elements as its columns: where its optimum is
+    // positive, all elements of the star are valid, at their corners and inside.
+    bool untangle_coefficients(std::int64_t v) {
+        if constexpr (D == 3) {
+            functions.clear();
+            for_each_affine(v, [&](double value, const Vec<D>& gradient) { functions.push_back({value, gradient}); });
+            for (const bool heights : {true, false}) {
+                program.set(star, functions, heights);
+                const bool solved = program.solve() == LpStatus::optimal;
+                if (solved && (program.pi[D] > 0.0 || !heights)) return store(v, star.to_global(program.position()));
+            }
+        }
+        return false;
+    }
+
+    // All coefficients that depend on v, of elements of any shape.
+    template <class F>
+    void for_each_affine(std::int64_t v, const F& f) const {
+        for (int i = 0; i < star.faces_count; ++i) {
+            if (stars.elements->codes[stars.element_of(stars.corners[stars.offsets[v] + i], D + 1)] >= WEDGE) continue;
+            const Edges<D> e = star.edges(i, Vec<D>{});
+            f(determinant(e), determinant_slope(e));
+        }
+        for_each_curved(v, [&](std::uint8_t code, const std::array<Vec<D>, MOST_NODES>& nodes, int here) {
+            for_each_dependent_coefficient(code, nodes.data(), here, f);
+        });
+    }
 
     bool store(std::int64_t v, const Vec<D>& x) {
         const bool changed = place(v, x);
@@ -144,6 +216,7 @@ struct Relocation {
         const double share = share_of_way<D>(star, target, parameters.min_det / scale);
         if (share < LEAST_SHARE) return false;
         const Vec<D> x = share == 1.0 ? target : star.snap(star.position + share * (target - star.position));
+        if (stars.elements != nullptr && !loses_nothing(v, x)) return false;
         return star.valid(x) && store(v, share == 1.0 ? start : star.to_global(x));
     }
 
@@ -154,7 +227,9 @@ struct Relocation {
         return x;
     }
 
-    bool take(std::int64_t v, const Vec<D>& x) {
+    bool take(std::int64_t v, const Vec<D>& wanted) {
+        if (wanted == star.position) return false;
+        const Vec<D> x = guarded(v, wanted);
         return x == star.position || makes_smaller(x) ? false : store(v, star.to_global(x));
     }
 
@@ -198,6 +273,7 @@ struct Relocation {
             case Move::mean_ratio: counts.moved += smooth_mean(v); break;
             case Move::raise_smallest: counts.moved += raise_smallest(v); break;
             case Move::come_back: counts.moved += come_back(v); break;
+            case Move::untangle_coefficients: counts.moved += untangle_coefficients(v); break;
             case Move::laplacian: break;
         }
     }

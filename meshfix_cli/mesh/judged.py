@@ -1,0 +1,107 @@
+"""Some elements of a mesh, and the passes over all of them that tell which are valid and how good they are."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import JUDGED
+
+Array = NDArray[np.float64]
+VALID, INSIDE, CORNER = range(3)  # verdicts of `kernels.judge`
+
+
+class Judged:
+    """Some elements of a connectivity; positions, such as those of inverted ones, count among these.
+
+    The quality of a simplex is its smallest (dihedral) angle, that of another element the angle whose sine is the
+    smallest scaled Jacobian at its corners.
+
+    Attributes
+    ----------
+    simplices : (s, d+1) int32
+        Their corner simplices.
+    """
+
+    def __init__(self, mesh: kernels.Connectivity, rows: NDArray[np.integer] | None = None) -> None:
+        """Take the rows (k,) of elements; None: all of them."""
+        self._mesh, self._rows = mesh, rows
+        if not len(mesh.codes):
+            self.simplices = mesh.simplices if rows is None else mesh.simplices[rows]
+            return
+        self._codes, self._offsets, self._nodes = mesh.codes, mesh.node_offsets, mesh.nodes
+        self.simplices = mesh.simplices
+        if rows is not None:
+            self._codes = mesh.codes[rows]
+            self._nodes = mesh.nodes[_spans(mesh.node_offsets, rows)]
+            self._offsets = _offsets(np.array([one.nodes for one in JUDGED])[self._codes])
+            self.simplices = mesh.simplices[_spans(mesh.simplex_offsets, rows)]
+
+    def __len__(self) -> int:
+        if self._rows is not None:
+            return len(self._rows)
+        return len(self._mesh.rows)
+
+    @property
+    def simplicial(self) -> bool:
+        """Whether all elements of the mesh are simplices of one type."""
+        return not len(self._mesh.codes)
+
+    def without(self, positions: NDArray[np.integer]) -> Judged:
+        """Return the others."""
+        rows = np.arange(len(self), dtype=np.int32) if self._rows is None else self._rows
+        return Judged(self._mesh, np.delete(rows, positions)) if len(positions) else self
+
+    def vertices(self, which: NDArray[np.integer] | NDArray[np.bool_]) -> NDArray[np.int32]:
+        """Return the vertices (any shape) of some elements, by their positions or a mask (k,)."""
+        if self.simplicial:
+            return self.simplices[which]
+        return self._nodes[_spans(self._offsets, np.arange(len(self))[which])]
+
+    def check(self, points: Array, threads: int) -> tuple[NDArray[np.int32], float]:
+        """Return the positions of inverted elements, and the smallest signed measure of a corner simplex."""
+        inverted, smallest = kernels.check(points, self.simplices, threads)
+        if not self.simplicial:
+            inverted = np.flatnonzero(self.verdicts(points, threads)).astype(np.int32)
+        return inverted, smallest
+
+    def verdicts(self, points: Array, threads: int) -> NDArray[np.uint8]:
+        """Return VALID, INSIDE or CORNER (k,): where the elements are not valid."""
+        if self.simplicial:
+            valid = kernels.measure(points, self.simplices, threads)[1]
+            return np.where(valid, VALID, CORNER).astype(np.uint8)
+        return self._judge(points, threads)[0]
+
+    def measures(self, points: Array, threads: int) -> Array:
+        """Return the signed areas or volumes (k,), in model units."""
+        if self.simplicial:
+            return kernels.measure(points, self.simplices, threads)[0]
+        return self._judge(points, threads)[1]
+
+    def angles(self, points: Array, threads: int) -> Array:
+        """Return the quality (k,) of each element as an angle in radians."""
+        if self.simplicial:
+            return kernels.angles(points, self.simplices, threads)[0]
+        return np.arcsin(np.clip(self._judge(points, threads)[2], 0.0, 1.0))
+
+    def min_sine2(self, points: Array, threads: int) -> float:
+        """Return the smallest sine^2 of the valid ones; 1: there are none."""
+        if self.simplicial:
+            return kernels.min_sine2(points, self.simplices, threads)
+        verdicts, _, quality = self._judge(points, threads)
+        return min(1.0, float(quality[verdicts == VALID].min(initial=1.0)) ** 2)
+
+    def _judge(self, points: Array, threads: int) -> tuple[NDArray[np.uint8], Array, Array]:
+        return kernels.judge(points, self._codes, self._offsets, self._nodes, threads)
+
+
+def _offsets(counts: NDArray[np.integer]) -> NDArray[np.int32]:
+    return np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+
+
+def _spans(offsets: NDArray[np.int32], rows: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return the numbers from offsets[r] to offsets[r + 1] for each of some rows, one behind the other."""
+    counts = offsets[rows + 1] - offsets[rows]
+    starts = np.cumsum(counts) - counts
+    return np.repeat(offsets[rows] - starts, counts) + np.arange(counts.sum())

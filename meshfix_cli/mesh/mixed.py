@@ -1,0 +1,184 @@
+"""Connectivity of elements of any types; that of simplices alone is in `topology.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, MIXED, Element, counted
+from meshfix_cli.mesh.topology import Block, Topology, crowded_facet, moebius, read_only
+
+Blocks = Sequence[tuple[Element, NDArray[np.int32]]]
+WIDTH = 4  # vertices of the largest facets
+
+
+@dataclass(frozen=True, eq=False)
+class MixedTopology(Topology):
+    """Connectivity of elements of any types; see `Topology`.
+
+    What is said there of simplices holds here of elements. In the connectivity, `simplices` and what follows from them
+    are of the corner simplices, `owners` (s,) tells the element of each; `mates` are of the facets, one element behind
+    the other.
+    """
+
+    @cached_property
+    def element(self) -> Element:
+        """Their type, where they have one, or what stands for several."""
+        codes = np.unique(self.connectivity.codes)
+        return JUDGED[codes[0]] if len(codes) == 1 else MIXED[self.dimension]
+
+    @cached_property
+    def blocks(self) -> tuple[Block, ...]:
+        """The elements by their types."""
+        mesh, blocks = self.connectivity, []
+        for code in np.unique(mesh.codes):
+            here = np.flatnonzero(mesh.codes == code)
+            here = here[np.argsort(mesh.rows[here])]
+            nodes = mesh.nodes[mesh.node_offsets[here, None] + np.arange(JUDGED[code].nodes)]
+            blocks.append(Block(JUDGED[code], read_only(mesh.rows[here]), read_only(mesh.vertices[nodes])))
+        return tuple(blocks)
+
+    @cached_property
+    def facets(self) -> NDArray[np.int32]:
+        """(f, 4) int32: the vertices of each facet in the numbers of the connectivity, from outside; -1: no more."""
+        mesh = self.connectivity
+        facets = np.full((len(mesh.facet_owners), WIDTH), -1, dtype=np.int32)
+        for code in np.unique(mesh.codes):
+            here, shape = np.flatnonzero(mesh.codes == code), JUDGED[code].shape
+            for position, facet in enumerate(shape.facets):
+                vertices = mesh.nodes[mesh.node_offsets[here, None] + np.array(facet)]
+                facets[mesh.facet_offsets[here] + position, : len(facet)] = vertices
+        return facets
+
+    @cached_property
+    def inner(self) -> NDArray[np.bool_]:
+        """(m,) bool: elements with a vertex that is not on the boundary."""
+        mesh = self.connectivity
+        off = ~mesh.boundary().view(bool)
+        return self.of_rows(np.logical_or.reduceat(off[mesh.nodes], mesh.node_offsets[:-1]))
+
+    @cached_property
+    def mirrored(self) -> NDArray[np.bool_]:
+        """(m,) bool: as in `Topology`; also several elements of a type that are all numbered the other way.
+
+        Files have conventions of their own for some types.
+        """
+        mirrored = super().mirrored
+        codes = self.of_rows(self.connectivity.codes)
+        group = self.component.astype(np.int64) * len(JUDGED) + codes
+        count = np.bincount(group)
+        against = np.bincount(group, weights=self.flipped != mirrored)
+        return mirrored ^ ((against == count) & (count > 1))[group]
+
+    def interface(self, regions: ArrayLike) -> NDArray[np.bool_]:
+        """Mark the vertices of facets between elements of different regions; see `Topology`."""
+        mesh = self.connectivity
+        labels = np.asarray(regions)[mesh.rows][mesh.facet_owners]
+        between = (mesh.facet_mates >= 0) & (labels != labels[mesh.facet_mates])
+        mask = np.zeros(len(mesh.vertices) + 1, dtype=bool)
+        mask[self.facets[between]] = True  # -1 marks what is cut off
+        return self.of_vertices(mask[:-1])
+
+    def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the two ends (e,) of each edge, once, in the numbers of the connectivity."""
+        facets, size = self.facets, (self.facets >= 0).sum(axis=1)
+        ends = []
+        for position in range(WIDTH if self.dimension == 3 else 1):
+            here = facets[size > position]
+            behind = np.where(position + 1 < size[size > position], position + 1, 0)
+            ends.append((here[:, position], np.take_along_axis(here, behind[:, None], axis=1)[:, 0]))
+        one, other = (np.concatenate(part).astype(np.int64) for part in zip(*ends, strict=True))
+        keys = np.unique(np.minimum(one, other) << 32 | np.maximum(one, other))
+        return (keys >> 32).astype(np.int32), (keys & 0xFFFFFFFF).astype(np.int32)
+
+
+def checked_blocks(cells: Sequence[tuple[str, ArrayLike]], n: int, dimension: int) -> Blocks:
+    """Check types, shapes and indices of elements; return them with int32 rows.
+
+    Raises
+    ------
+    InvalidMeshError
+        A type that is not judged or of another dimension, indices out of range, an element that names a vertex twice.
+    """
+    blocks, before = [], 0
+    for key, values in cells:
+        element, rows = ELEMENTS.get(key), np.asarray(values)
+        if element not in JUDGED or element.shape.dimension != dimension:
+            raise InvalidMeshError(f"elements of type {key} are not solved for in {dimension} dimensions")
+        if rows.ndim != 2 or rows.shape[1] != element.nodes or rows.dtype.kind not in "iu":
+            raise InvalidMeshError(
+                f"{key} elements have the shape {rows.shape}; (m, {element.nodes}) integers are needed"
+            )
+        outside = ((rows < 0) | (rows >= n)).any(axis=1)
+        if outside.any():
+            first = int(np.argmax(outside))
+            there = f"there {'is' if n == 1 else 'are'} {counted(n, 'point', 'points')}"
+            raise InvalidMeshError(f"element {before + first} refers to vertices {rows[first].tolist()}, but {there}")
+        ordered = np.sort(rows, axis=1)
+        repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+        if repeated.any():
+            first = int(np.argmax(repeated))
+            raise InvalidMeshError(f"element {before + first} names a vertex twice: {rows[first].tolist()}")
+        blocks.append((element, np.ascontiguousarray(rows, dtype=np.int32)))
+        before += len(rows)
+    if before == 0:
+        raise InvalidMeshError("the mesh has no elements")
+    if sum(rows.size for _, rows in blocks) >= 2**29 or n >= 2**31:
+        raise InvalidMeshError("the mesh is too large: 67 million hexahedra are the limit")
+    return blocks
+
+
+def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.int32], threads: int) -> MixedTopology:
+    """Orient elements, leave out repetitions and find what is joined; see `topology.build_topology`.
+
+    Parameters
+    ----------
+    points : (n, d) float64
+    blocks : as `checked_blocks` gives them
+    used : (k,) int32
+        The vertices of elements, ascending.
+    threads : int
+
+    Raises
+    ------
+    InvalidMeshError
+        A facet of more than two elements, a Moebius band.
+    """
+    codes = np.concatenate([np.full(len(rows), JUDGED.index(element), dtype=np.uint8) for element, rows in blocks])
+    nodes = np.concatenate([rows.ravel() for _, rows in blocks])
+    source: NDArray[np.int32] = np.arange(len(codes), dtype=np.int32)
+    mesh = kernels.Connectivity(points, codes, nodes, used, threads)
+    if mesh.crowded >= 0:
+        kept = [_first_of_each(rows) for _, rows in blocks]
+        starts = np.cumsum([0, *(len(rows) for _, rows in blocks[:-1])])
+        source = np.concatenate([start + rows for start, rows in zip(starts, kept, strict=True)]).astype(np.int32)
+        nodes = np.concatenate([rows[first].ravel() for (_, rows), first in zip(blocks, kept, strict=True)])
+        codes = codes[source]
+        mesh = kernels.Connectivity(points, codes, nodes, used, threads)
+    if mesh.crowded >= 0:
+        raise crowded_facet(MIXED[points.shape[1]].shape, _facet_of(mesh, mesh.crowded))
+    if not mesh.orientable:
+        raise moebius(MIXED[points.shape[1]].shape)
+    flipped = mesh.against.astype(bool) ^ (mesh.signed_sizes(points) < 0)[mesh.component]
+    mesh.take_apart(flipped, threads)
+    rows = np.zeros_like(flipped)
+    rows[mesh.rows] = flipped
+    return MixedTopology(len(points), source, rows, mesh)
+
+
+def _first_of_each(rows: NDArray[np.int32]) -> NDArray[Any]:
+    return np.sort(np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1])
+
+
+def _facet_of(mesh: kernels.Connectivity, facet: int) -> list[int]:
+    owner = int(mesh.facet_owners[facet])
+    shape = JUDGED[mesh.codes[owner]].shape
+    nodes = mesh.nodes[mesh.node_offsets[owner] + np.array(shape.facets[facet - mesh.facet_offsets[owner]])]
+    return mesh.vertices[nodes].tolist()

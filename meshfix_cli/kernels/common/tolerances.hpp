@@ -8,6 +8,12 @@ namespace meshfix {
 // A simplex is valid if det > VALID * (product of the edges of the determinant): ten times its rounding error.
 constexpr double VALID = 1e-14;
 
+// A Bezier coefficient is positive if it is larger than VALID * (product of the edges), the mean over its determinants.
+// Where all are larger than so many times that of the longest edges, so are the corners, from whichever vertex.
+constexpr double BEZIER_PLAIN = 2.0;
+constexpr int BEZIER_DEPTH = 60;    // halvings of a hexahedron: 20 in each direction, if it is bent in all
+constexpr int BEZIER_PARTS = 4096;  // of it that are looked at; what is not decided then is not valid
+
 // Linear programme. All are relative to the largest number of their kind in the star.
 constexpr double LP_DROPPED_FACE2 = 1e-24;  // |n|^2 below which co-located neighbours leave the star
 constexpr double LP_RANK = 1e-9;            // residual below which the normals do not span R^d

@@ -12,6 +12,9 @@ Uint8 = NDArray[np.uint8]
 
 BUILD: str  # what processors these are for
 DUE: int
+SHAPES: list[
+    tuple[int, int, list[list[int]], list[list[int]], list[int], float, list[list[float]]]
+]  # by code: dimension, number of nodes, corner simplices, facets, order of the mirrored, weight, inverse Gram matrix
 BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
 
 class Connectivity:
@@ -141,6 +144,22 @@ def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
 
 def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
     """Signed measure and validity, each (m,)."""
+
+def judge(
+    points: Float64, codes: Uint8, offsets: Int32, nodes: Int32, threads: int
+) -> tuple[Uint8, Float64, Float64]:
+    """Verdict, signed measure and quality, each (m,), of elements with types (m,) numbered as SHAPES.
+
+    Element e has the vertices nodes[offsets[e] : offsets[e + 1]]. Verdicts: 0 valid, 1 not valid inside (or not proved to
+    be so), 2 not valid at a corner. Quality is the smallest sine of a simplex, with the sign of its measure, and the
+    smallest scaled Jacobian at the corners of anything else; 0 where an edge has no length.
+    """
+
+def coefficients(nodes: Float64, code: int) -> Float64:
+    """Bezier coefficients (k,) of det J of one element with nodes (n, d), those at its corner simplices first."""
+
+def coefficient_columns(nodes: Float64, code: int, node: int) -> tuple[Float64, Float64]:
+    """Of the coefficients that depend on a node, the values (k,) with it at 0, and the gradients (k, d) by it."""
 
 def angles(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, Float64]:
     """Smallest and largest (dihedral) angle in radians, each (m,)."""

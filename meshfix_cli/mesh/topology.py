@@ -151,8 +151,8 @@ class Topology:
     @cached_property
     def inner(self) -> NDArray[np.bool_]:
         """(m,) bool: simplices with a vertex that is not on the boundary."""
-        inner: NDArray[np.bool_] = (self.used & ~self.boundary)[self.simplices].any(axis=1)
-        return inner
+        off = self.used & ~self.boundary
+        return np.asarray(off[self.simplices].any(axis=1))
 
     @cached_property
     def mirrored(self) -> NDArray[np.bool_]:

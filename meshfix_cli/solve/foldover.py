@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import JUDGED
 from meshfix_cli.solve.region import Region
 
 Array = NDArray[np.float64]
@@ -178,24 +179,43 @@ class _Region(Region):
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
         super().__init__(mesh, free)
         self.reach, self.threads = reach, threads
+        self.codes = mesh.codes[mesh.owners[self.rows]] if len(mesh.codes) else None
 
     def uniform(self, points: Array) -> Array:
         """Return one target for all (s,): the region's signed measure, which its boundary fixes, in equal parts.
 
-        A target is the size of a regular simplex: the d-th root of its determinant, in model units.
+        A target is the size of a regular simplex: the d-th root of its determinant, in model units. Where elements are
+        not all simplices, it is the ideal corner of edges of one length.
         """
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         # A region whose own boundary is turned inside out may have no measure, or a negative one.
         mean = max(measure.mean(), 1e-3 * np.abs(measure).mean())
-        size = max(mean, np.finfo(float).tiny) ** (1 / points.shape[1])
-        return _of_determinants(np.full(len(measure), size), points.shape[1])
+        size = max(mean / self._unit_measures().mean(), np.finfo(float).tiny) ** (1 / points.shape[1])
+        return self._targets(np.full(len(measure), size))
 
     def sizes(self, points: Array) -> Array:
         """Return targets (s,) of the sizes that the simplices have at positions (n, d), none much smaller than most."""
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
-        sizes = np.abs(measure) ** (1 / points.shape[1])
-        sizes = np.maximum(sizes, max(SMALLEST_TARGET * np.median(sizes), np.finfo(float).tiny))
-        return _of_determinants(sizes, points.shape[1])
+        sizes = (np.abs(measure) / self._unit_measures()) ** (1 / points.shape[1])
+        return self._targets(np.maximum(sizes, max(SMALLEST_TARGET * np.median(sizes), np.finfo(float).tiny)))
+
+    def _unit_measures(self) -> Array:
+        """Return the measures of what has size one: (1,) where all are simplices, else (s,)."""
+        if self.codes is None:
+            return np.ones(1)
+        d = self.simplices.shape[1] - 1
+        return (1 / math.factorial(d) / np.array([one.shape.weight for one in JUDGED]))[self.codes]
+
+    def _targets(self, sizes: Array) -> Array:
+        """Turn sizes (s,), d-th roots of measures or lengths of edges, into targets of the energy."""
+        d = self.simplices.shape[1] - 1
+        if self.codes is None:
+            return sizes * math.factorial(d) ** (1 / d)
+        inverses = np.zeros((len(JUDGED), d, d))
+        for code, element in enumerate(JUDGED):
+            if element.shape.dimension == d:
+                inverses[code] = np.linalg.inv(np.array(element.shape.ideal).T)
+        return np.ascontiguousarray(inverses[self.codes] / sizes[:, None, None])
 
     def minimise(self, start: Array, targets: Array, effort: Effort) -> Iterator[Array]:
         """Yield the points after each minimisation; eps falls by the paper's rule in between."""
@@ -247,11 +267,6 @@ class _Region(Region):
         points = start.copy()
         points[self.moving] = problem.points()
         return points
-
-
-def _of_determinants(sizes: Array, d: int) -> Array:
-    """Turn d-th roots of measures into those of determinants."""
-    return sizes * math.factorial(d) ** (1 / d)
 
 
 def _next_eps(eps: float, least: float, sigma: float) -> float:

@@ -122,6 +122,8 @@ class Run:
 
     def enter(self, phase: Phase) -> bool:
         """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
+        if self.mendable.simplicial if phase.inside else phase.layers and not self.mendable.simplicial:
+            return False
         if phase.smooths:
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
                 return False
@@ -293,7 +295,7 @@ class Run:
         for move in cycle(phase.moves):
             if len(phase.moves) > 1:  # what was visited by one move is due for the next
                 states = _due(near)
-            if phase.only_invalid and move is Move.UNTANGLE_HEIGHTS:
+            if phase.only_invalid and move in (Move.UNTANGLE_HEIGHTS, Move.UNTANGLE_COEFFICIENTS):
                 states = _due(near & (self._broken() | self._grown(self.changed, 1)))
             yield self._relocated(self.points, move, states)
 
@@ -311,7 +313,7 @@ class Run:
 
     def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
-        if self.max_move < math.inf or self.left or not self.free.any():
+        if self.max_move < math.inf or self.left or not (self.free.any() and self.mendable.simplicial):
             return
         angles = self._angles(self.points)
         smallest = self._least(angles)

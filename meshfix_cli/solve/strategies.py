@@ -79,6 +79,8 @@ class Phase:
         has one takes the place of the other, where there is a reference or layers were followed.
     layers : bool
         The function is that of `layers.py`, which makes up a reference.
+    inside : bool
+        For elements that may be invalid inside though no corner is: simplices never are.
     """
 
     name: str
@@ -92,6 +94,7 @@ class Phase:
     shapes: Literal["first", "lost", "risen"] | None = None
     to_reference: Literal["", "follow", "mend", "approach"] = ""
     layers: bool = False
+    inside: bool = False
 
     @property
     def smooths(self) -> bool:
@@ -104,6 +107,10 @@ _LP = Phase("LP", (Move.UNTANGLE,))
 _LP_CYCLES = (*(Move.UNTANGLE_HEIGHTS,) * 3, Move.SMART_LAPLACIAN)
 _STALLING = replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled")
 _LP_INVALID = Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True)
+_LP_COEFFICIENTS = Phase(
+    "LP on coefficients", (Move.UNTANGLE_COEFFICIENTS,), SWEEPS, until="stalled", only_invalid=True, from_best=True,
+    inside=True,
+)  # fmt: skip
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
 _FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
@@ -111,7 +118,8 @@ _FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
 
 def _starts(rings: tuple[int, ...] = ()) -> tuple[Phase, ...]:
     """Give the phases of both starts, Laplacian sweeps and the embedding, in a region."""
-    phases = (_STALLING, _LP_INVALID, _EMBEDDING, replace(_LP_INVALID, from_best=False))
+    again = tuple(replace(phase, from_best=False) for phase in (_LP_INVALID, _LP_COEFFICIENTS))
+    phases = (_STALLING, _LP_INVALID, _LP_COEFFICIENTS, _EMBEDDING, *again)
     near = " near inverted elements" * bool(rings)
     return tuple(replace(phase, name=phase.name + near, rings=rings) for phase in phases)
 
@@ -122,12 +130,13 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
         *_starts(),
         replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
         _FOLDOVER,
+        _LP_COEFFICIENTS,
     ),
     "LS": (_LAPLACIAN,),
-    "US": (_LP,),
-    "CS": (Phase("Laplacian or LP", (Move.COMBINED_UNTANGLE,)),),
-    "LUS": (replace(_LAPLACIAN, max_sweeps=3), _LP),
-    "FF": (_FOLDOVER,),
+    "US": (_LP, _LP_COEFFICIENTS),
+    "CS": (Phase("Laplacian or LP", (Move.COMBINED_UNTANGLE,)), _LP_COEFFICIENTS),
+    "LUS": (replace(_LAPLACIAN, max_sweeps=3), _LP, _LP_COEFFICIENTS),
+    "FF": (_FOLDOVER, _LP_COEFFICIENTS),
 }
 
 # Where there is a reference: elements should have the shapes that they had; the strategy only mends what is left.

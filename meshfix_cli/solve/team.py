@@ -25,12 +25,12 @@ class Team(Protocol):
     Attributes
     ----------
     own_vertices : (n,) bool
-    own_simplices : (m,) bool
-        Each simplex is some process's own, and only one's.
+    own_elements : (m,) bool
+        Each element is some process's own, and only one's.
     """
 
     own_vertices: Mask
-    own_simplices: Mask
+    own_elements: Mask
 
     def total(self, count: int) -> int:
         """Return the sum of a number over all processes."""
@@ -68,7 +68,7 @@ class Alone:
     def __init__(self, mesh: Mesh, threads: int) -> None:
         self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
         self.own_vertices = np.ones(len(self.stars.vertices), dtype=bool)
-        self.own_simplices = np.ones(len(self.stars.rows), dtype=bool)
+        self.own_elements = np.ones(len(self.stars.rows), dtype=bool)
 
     def total(self, count: int) -> int:
         """Return the number."""

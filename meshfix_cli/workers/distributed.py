@@ -54,7 +54,7 @@ class Part:
     movable : (n,) bool
     simplices : (m, d+1) int32
         Those of the own vertices' stars, in the order of the whole, so that sums over a star have its order too.
-    own_simplices, hopeless : (m,) bool
+    own_elements, hopeless : (m,) bool
     owners, colours : (n - own,) int32
         Of the ghosts: the process that moves them and the colour of their block.
     block_colours : (own blocks,) int32
@@ -69,7 +69,7 @@ class Part:
     points: Array
     movable: Mask
     simplices: Numbers
-    own_simplices: Mask
+    own_elements: Mask
     hopeless: Mask
     owners: Numbers
     colours: Numbers
@@ -319,7 +319,7 @@ class Ranks:
         self.mesh = Mesh(part.points, topology, part.movable)
         self.stars = topology.stars(threads)
         self.own_vertices = np.arange(len(part.vertices)) < part.own
-        self.own_simplices = part.own_simplices
+        self.own_elements = part.own_elements
         self.halos = self._halos()
         self.numbers = comm.gather(part.vertices, ROOT) or []  # in the root
 

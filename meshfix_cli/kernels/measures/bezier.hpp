@@ -100,7 +100,7 @@ int coefficients(std::uint8_t code, const std::array<double, D>* nodes, double* 
             return 9;
         }
     }
-    const Shape& shape = SHAPES[code];
+    const ElementShape& shape = SHAPES[code];
     for (int c = 0; c < shape.simplices; ++c) out[c] = determinant(corner_edges(nodes, shape.simplex[c]));
     return shape.simplices;
 }
@@ -240,7 +240,7 @@ template <std::size_t D>
 Verdict judge(std::uint8_t code, const std::array<double, D>* nodes, double unit = 0.0) {
     if constexpr (D == 3)
         if (is_valid_at_once(code, nodes, unit)) return Verdict::valid;
-    const Shape& shape = SHAPES[code];
+    const ElementShape& shape = SHAPES[code];
     for (int c = 0; c < shape.simplices; ++c) {
         const Edges<D> e = corner_edges(nodes, shape.simplex[c]);
         const auto corners = [&] { return corner_points(nodes, shape.simplex[c]); };
@@ -266,7 +266,7 @@ double measure(std::uint8_t code, const std::array<double, D>* nodes) {
 // length.
 template <std::size_t D>
 double scaled_jacobian(std::uint8_t code, const std::array<double, D>* nodes) {
-    const Shape& shape = SHAPES[code];
+    const ElementShape& shape = SHAPES[code];
     double smallest = INFINITY;
     for (int c = 0; c < shape.simplices; ++c) {
         const Edges<D> e = corner_edges(nodes, shape.simplex[c]);
@@ -280,7 +280,7 @@ double scaled_jacobian(std::uint8_t code, const std::array<double, D>* nodes) {
 // Calls f(value, gradient) for what depends on one node of the corner determinants: the value with that node at 0.
 template <std::size_t D, class F>
 void for_each_dependent_corner(std::uint8_t code, const std::array<double, D>* nodes, int node, const F& f) {
-    const Shape& shape = SHAPES[code];
+    const ElementShape& shape = SHAPES[code];
     for (int c = 0; c < shape.simplices; ++c)
         for (int k = 0; k <= static_cast<int>(D); ++k) {
             if (shape.simplex[c][k] != node) continue;

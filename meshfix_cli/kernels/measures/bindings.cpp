@@ -1,4 +1,5 @@
 // Bindings of the passes that measure a mesh, and of the sines of a star.
+#include "measures/elements.hpp"
 #include "measures/measures.hpp"
 #include "measures/python.hpp"
 #include "mesh/python.hpp"
@@ -85,6 +86,62 @@ auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::ui
     return std::make_tuple(to_numpy(std::move(values)), to_numpy(std::move(gradients), d), smallest);
 }
 
+auto judge_py(const Matrix<const double>& points, const Vector<const std::uint8_t>& codes,
+              const Vector<const std::int32_t>& offsets, const Vector<const std::int32_t>& nodes, int threads) {
+    const ElementsView elements{codes.data(), offsets.data(), nodes.data(), static_cast<std::int64_t>(codes.shape(0))};
+    Judgement found = with_dimension(points.shape(1), [&](auto d) { return judge<d>(points.data(), elements, threads); });
+    return std::make_tuple(to_numpy(std::move(found.verdict)), to_numpy(std::move(found.measure)),
+                           to_numpy(std::move(found.quality)));
+}
+
+// The nodes of one element.
+template <int D>
+std::array<Vec<D>, MOST_NODES> nodes_of(const Matrix<const double>& rows) {
+    std::array<Vec<D>, MOST_NODES> nodes{};
+    for (std::size_t i = 0; i < std::min<std::size_t>(rows.shape(0), MOST_NODES); ++i) nodes[i] = load<D>(rows.data() + i * D);
+    return nodes;
+}
+
+auto coefficients_py(const Matrix<const double>& rows, std::uint8_t code) {
+    std::vector<double> values(MOST_COEFFICIENTS);
+    values.resize(with_dimension(rows.shape(1), [&](auto dimension) {
+        return coefficients(code, nodes_of<dimension>(rows).data(), values.data());
+    }));
+    return to_numpy(std::move(values));
+}
+
+auto coefficient_columns_py(const Matrix<const double>& rows, std::uint8_t code, int node) {
+    std::vector<double> values, gradients;
+    with_dimension(rows.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const auto nodes = nodes_of<D>(rows);
+        for_each_dependent_coefficient(code, nodes.data(), node, [&](double value, const Vec<D>& gradient) {
+            values.push_back(value);
+            gradients.insert(gradients.end(), gradient.begin(), gradient.end());
+        });
+    });
+    return std::make_pair(to_numpy(std::move(values)), to_numpy(std::move(gradients), rows.shape(1)));
+}
+
+// The table of shapes.hpp: dimension, nodes, simplices, facets, the mirrored order, weight and the inverse Gram matrix.
+auto shapes_py() {
+    using Rows = std::vector<std::vector<int>>;
+    std::vector<std::tuple<int, int, Rows, Rows, std::vector<int>, double, std::vector<std::vector<double>>>> table;
+    for (const ElementShape& shape : SHAPES) {
+        Rows simplices, facets;
+        for (int c = 0; c < shape.simplices; ++c)
+            simplices.emplace_back(shape.simplex[c].begin(), shape.simplex[c].begin() + shape.dimension + 1);
+        for (int k = 0; k < shape.facets; ++k)
+            facets.emplace_back(shape.facet[k].begin(), shape.facet[k].begin() + shape.facet_size(k));
+        std::vector<std::vector<double>> gram;
+        for (int i = 0; i < shape.dimension; ++i)
+            gram.emplace_back(shape.gram[i].begin(), shape.gram[i].begin() + shape.dimension);
+        const std::vector<int> mirrored(shape.mirrored.begin(), shape.mirrored.begin() + shape.nodes);
+        table.emplace_back(shape.dimension, shape.nodes, simplices, facets, mirrored, shape.weight, gram);
+    }
+    return table;
+}
+
 }  // namespace
 
 void bind_measures(nb::module_& m) {
@@ -93,6 +150,11 @@ void bind_measures(nb::module_& m) {
     m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("judge", &judge_py, "points"_a.noconvert(), "codes"_a.noconvert(), "offsets"_a.noconvert(),
+          "nodes"_a.noconvert(), "threads"_a);
+    m.def("coefficients", &coefficients_py, "nodes"_a.noconvert(), "code"_a);
+    m.def("coefficient_columns", &coefficient_columns_py, "nodes"_a.noconvert(), "code"_a, "node"_a);
+    m.attr("SHAPES") = nb::cast(shapes_py());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
 }
 

@@ -85,7 +85,7 @@ template <int D>
 double min_sine2(const Star<D>& star, const Vec<D>& x, double floor) {
     double smallest = INFINITY;
     for (std::size_t b = 0; b < star.blocks.size(); ++b) {
-        const Pack lanes = min_sine2_of(star, b, star.edges(star.blocks[b], x));
+        const Pack lanes = min_sine2_of<D>(star, b, star.edges(star.blocks[b], x));
         for (int i = 0; i < LANES; ++i) {
             double lane = lanes[i];
             if (!(lane > 0.0) && star.valid_face(b, i, x)) {

@@ -21,7 +21,7 @@ struct Elements {
 
     bool empty() const { return codes.empty(); }
     std::int64_t size() const { return static_cast<std::int64_t>(codes.size()); }
-    const Shape& shape(std::int64_t e) const { return SHAPES[codes[e]]; }
+    const ElementShape& shape(std::int64_t e) const { return SHAPES[codes[e]]; }
     const std::int32_t* nodes_of(std::int64_t e) const { return nodes.data() + offsets[e]; }
 
     // The vertices of a facet, seen from outside; returns how many there are.
@@ -33,7 +33,7 @@ struct Elements {
 };
 
 // Where the things of each element begin, by their number for each shape; what is behind the last comes last.
-inline std::vector<std::int32_t> offsets_by_shape(const std::vector<std::uint8_t>& codes, int Shape::*count) {
+inline std::vector<std::int32_t> offsets_by_shape(const std::vector<std::uint8_t>& codes, int ElementShape::*count) {
     std::vector<std::int32_t> offsets(codes.size() + 1, 0);
     for (std::size_t e = 0; e < codes.size(); ++e) offsets[e + 1] = offsets[e] + SHAPES[codes[e]].*count;
     return offsets;
@@ -50,7 +50,7 @@ inline std::vector<std::int32_t> owners_of(const std::vector<std::int32_t>& offs
 inline Elements ordered_elements(const std::uint8_t* codes, const std::int32_t* nodes, std::int64_t m,
                                  const std::vector<std::int32_t>& number, std::int64_t n,
                                  std::vector<std::int32_t>& rows) {
-    const std::vector<std::int32_t> from = offsets_by_shape({codes, codes + m}, &Shape::nodes);
+    const std::vector<std::int32_t> from = offsets_by_shape({codes, codes + m}, &ElementShape::nodes);
     std::vector<std::int32_t> first(m), next(n + 1, 0);
     for (std::int64_t e = 0; e < m; ++e) {
         first[e] = number[nodes[from[e]]];
@@ -63,12 +63,12 @@ inline Elements ordered_elements(const std::uint8_t* codes, const std::int32_t* 
     Elements elements;
     elements.codes.resize(m);
     for (std::int64_t e = 0; e < m; ++e) elements.codes[e] = codes[rows[e]];
-    elements.offsets = offsets_by_shape(elements.codes, &Shape::nodes);
+    elements.offsets = offsets_by_shape(elements.codes, &ElementShape::nodes);
     elements.nodes.resize(elements.offsets.back());
     for (std::int64_t e = 0; e < m; ++e)
         for (std::int32_t i = 0; i < SHAPES[elements.codes[e]].nodes; ++i)
             elements.nodes[elements.offsets[e] + i] = number[nodes[from[rows[e]] + i]];
-    elements.facet_offsets = offsets_by_shape(elements.codes, &Shape::facets);
+    elements.facet_offsets = offsets_by_shape(elements.codes, &ElementShape::facets);
     elements.facet_owners = owners_of(elements.facet_offsets);
     return elements;
 }
@@ -158,7 +158,7 @@ inline Orientation orient(const Elements& elements, const Facets& facets) {
 }
 
 // Which facet of a shape is which once its nodes have the other orientation.
-inline std::array<int, MOST_FACETS> mirrored_facets(const Shape& shape) {
+inline std::array<int, MOST_FACETS> mirrored_facets(const ElementShape& shape) {
     const auto set_of = [&](int k, bool mirrored) {
         unsigned set = 0;
         for (int i = 0; i < shape.facet_size(k); ++i) {
@@ -197,7 +197,7 @@ inline void mirror(Elements& elements, std::vector<std::int32_t>& mates, const s
 // The corner simplices (s, D+1).
 template <int D>
 std::vector<std::int32_t> corner_simplices(Elements& elements, int threads) {
-    elements.simplex_offsets = offsets_by_shape(elements.codes, &Shape::simplices);
+    elements.simplex_offsets = offsets_by_shape(elements.codes, &ElementShape::simplices);
     elements.owners = owners_of(elements.simplex_offsets);
     std::vector<std::int32_t> simplices(static_cast<std::size_t>(elements.simplex_offsets.back()) * (D + 1));
     for_each_range(elements.size(), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {

@@ -10,7 +10,7 @@ namespace meshfix {
 constexpr std::uint8_t TRIANGLE = 0, QUAD = 1, TETRA = 2, PYRAMID = 3, WEDGE = 4, HEXAHEDRON = 5;
 constexpr int MOST_NODES = 8, MOST_SIMPLICES = 8, MOST_FACETS = 6;
 
-struct Shape {
+struct ElementShape {
     int dimension, nodes, simplices, facets;
     std::array<std::array<std::int8_t, 4>, MOST_SIMPLICES> simplex;  // each a node and its neighbours, positively oriented
     std::array<std::array<std::int8_t, 4>, MOST_FACETS> facet;       // seen from outside; -1 behind a triangle's last
@@ -21,7 +21,7 @@ struct Shape {
     int facet_size(int k) const { return dimension == 2 ? 2 : facet[k][3] < 0 ? 3 : 4; }
 };
 
-inline const std::array<Shape, 6> SHAPES{{
+inline const std::array<ElementShape, 6> SHAPES{{
     {2, 3, 1, 3, {{{0, 1, 2}}}, {{{1, 2, -1, -1}, {2, 0, -1, -1}, {0, 1, -1, -1}}}, {1, 0, 2}, 1.1547005383792517,
      {{{4.0 / 3, -2.0 / 3, 0}, {-2.0 / 3, 4.0 / 3, 0}, {0, 0, 0}}}},
     {2, 4, 4, 4, {{{0, 1, 3}, {1, 2, 0}, {2, 3, 1}, {3, 0, 2}}},

@@ -93,7 +93,7 @@ struct Star {
         for (int i = 0; i < static_cast<int>(roles.size()) * LANES; ++i) {
             const std::int32_t corner = stars.corners[stars.offsets[v] + std::min(i, faces_count - 1)];
             const int position_of_free = corner % (D + 1);
-            const Shape& shape = stars.elements->shape(stars.element_of(corner, D + 1));
+            const ElementShape& shape = stars.elements->shape(stars.element_of(corner, D + 1));
             Roles<D>& role = roles[i / LANES];
             const int lane = i % LANES;
             const auto& face = opposite_face<D>(position_of_free);
@@ -113,7 +113,7 @@ struct Star {
     }
 
     // The weight of a squared edge in the sum over G_ij a_i.a_j, the a_i from position 0 of a corner simplex.
-    static double edge_weight(const Shape& shape, int i, int j) {
+    static double edge_weight(const ElementShape& shape, int i, int j) {
         if (i > 0 && j > 0) return -shape.gram[i - 1][j - 1];
         const int k = std::max(i, j) - 1;
         return shape.gram[k][0] + shape.gram[k][1] + shape.gram[k][2];

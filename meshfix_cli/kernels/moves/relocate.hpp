@@ -96,8 +96,9 @@ struct Relocation {
     }
 
     // The programme of the paper with the Bezier coefficients of the elements as its columns: where its optimum is
-    // positive, all elements of the star are valid, at their corners and inside.
+    // positive, all elements of the star are valid, at their corners and inside. Where corners say all, they are these.
     bool untangle_coefficients(std::int64_t v) {
+        if (D == 2 || stars.elements == nullptr) return untangle_heights(v);
         if constexpr (D == 3) {
             functions.clear();
             for_each_affine(v, [&](double value, const Vec<D>& gradient) { functions.push_back({value, gradient}); });

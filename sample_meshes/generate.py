@@ -8,6 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from building import stacked
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
@@ -38,19 +39,17 @@ def plate(h: float, relaxations: int = 1, seed: int = 9) -> tuple[Points, Simpli
 def bracket(h: float, layers: int, angle: float = 1.2) -> tuple[Points, Simplices]:
     """Return a tetrahedral mesh (n, 3), (m, 4): the plate made thick in layers and bent round by `angle`."""
     points, tets = extruded(*plate(h), np.linspace(0.0, layers * h * 0.8, layers + 1))
-    return _bent(points, angle), tets
+    return bent(points, angle), tets
 
 
 def extruded(plane: Points, triangles: Simplices, heights: NDArray[np.float64]) -> tuple[Points, Simplices]:
     """Return the tetrahedra between copies of a triangle mesh at some heights."""
-    count = len(plane)
-    points = np.concatenate([np.column_stack([plane, np.full(count, z)]) for z in heights])
-    layers = range(len(heights) - 1)
-    prisms = np.concatenate([np.hstack([triangles + k * count, triangles + (k + 1) * count]) for k in layers])
-    return points, _split_prisms(prisms)
+    points, wedges = stacked(plane, triangles, heights)
+    return points, split_wedges(wedges)
 
 
-def _bent(points: Points, angle: float) -> Points:
+def bent(points: Points, angle: float) -> Points:
+    """Bend a plate upon z = 0 round the y axis."""
     if angle == 0.0:
         return points
     radius = PLATE[0] / angle
@@ -58,11 +57,11 @@ def _bent(points: Points, angle: float) -> Points:
     return np.column_stack([r * np.sin(turn), points[:, 1], r * np.cos(turn) - radius])
 
 
-def _split_prisms(prisms: Simplices) -> Simplices:
-    """Cut each prism into three tetrahedra; diagonals start at the lower number, so neighbours agree."""
-    order = np.argsort(prisms[:, :3], axis=1)
-    a, b, c = np.take_along_axis(prisms[:, :3], order, axis=1).T
-    d, e, f = np.take_along_axis(prisms[:, 3:], order, axis=1).T
+def split_wedges(wedges: Simplices) -> Simplices:
+    """Cut each wedge into three tetrahedra; diagonals start at the lower number, so neighbours agree."""
+    order = np.argsort(wedges[:, :3], axis=1)
+    a, b, c = np.take_along_axis(wedges[:, :3], order, axis=1).T
+    d, e, f = np.take_along_axis(wedges[:, 3:], order, axis=1).T
     tets = np.concatenate([np.stack(t, axis=1) for t in ((a, b, c, f), (a, b, f, e), (a, e, f, d))])
     odd = np.tile((order[:, 0] + 1) % 3 != order[:, 1], 3)
     tets[odd] = tets[odd][:, [1, 0, 2, 3]]

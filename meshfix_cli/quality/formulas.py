@@ -1,25 +1,21 @@
-"""The formulas of the metrics: for each of `metrics.METRICS` one function of its name.
-
-A formula takes edges (m, d, d) float64, of which edges[:, k] leads from vertex 0 of a simplex to vertex k+1, and signed
-measures (m,), and gives values (m,). Lengths are in model units, d is 2 or 3.
-"""
+"""The values of the metrics: by the formulas of `simplices.py`, and of `corners.py` for all other types."""
 
 from __future__ import annotations
-
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality import corners, simplices
 from meshfix_cli.quality.metrics import METRICS
 
 Array = NDArray[np.float64]
 
 
 def evaluate(name: str, mesh: Mesh) -> Array:
-    """Return the values of a metric for all simplices.
+    """Return the values of a metric for all elements.
 
     Parameters
     ----------
@@ -30,101 +26,44 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     Returns
     -------
     (m,) float64
-        Where nothing is left of a simplex, and the formula is 0 / 0, the worst value that there is.
+        See `evaluate_at`; nan for elements of types that do not have the metric.
     """
-    worst, formula = METRICS[name].worst, globals()[name]
-    p = mesh.points[mesh.topology.simplices]
-    measure = kernels.measure(mesh.points, mesh.topology.simplices, 1)[0]
+    values = np.full(mesh.topology.m, np.nan)
+    for block in mesh.topology.blocks:
+        if block.element.key in METRICS[name].elements:
+            values[block.rows] = evaluate_at(name, block.element, mesh.points[block.vertices])
+    return values
+
+
+def evaluate_at(name: str, element: Element, nodes: Array) -> Array:
+    """Return the values of a metric for elements of a type that has it.
+
+    Parameters
+    ----------
+    name : str
+        A key of `METRICS`.
+    element : Element
+    nodes : (k, nodes, d) float64
+        Where the nodes of each element are, in positive order.
+
+    Returns
+    -------
+    (k,) float64
+        Where nothing is left of an element, and the formula is 0 / 0, the worst value that there is.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        values = formula(p[:, 1:] - p[:, :1], measure)
-    return np.where(np.isnan(values), 0.0 if worst == "min" else np.inf, values)
+        if element.judged_by == "determinant":
+            measure = kernels.measure(*simplices.numbered(nodes), 1)[0]
+            values = getattr(simplices, name)(nodes[:, 1:] - nodes[:, :1], measure)
+        else:
+            values = getattr(corners, name)(element, nodes)
+    return np.where(np.isnan(values), 0.0 if METRICS[name].worst == "min" else np.inf, values)
 
 
 def worst_and_mean(name: str, mesh: Mesh) -> tuple[float, float]:
-    """Return the worst and the mean value of a metric."""
+    """Return the worst and the mean value of a metric among the elements that have it; nan, where none has."""
     values = evaluate(name, mesh)
+    values = values[~np.isnan(values)]
+    if not len(values):
+        return np.nan, np.nan
     return float(values.min() if METRICS[name].worst == "min" else values.max()), float(values.mean())
-
-
-def _lengths(edges: Array) -> Array:
-    """Lengths (m, d+1, d+1) of the edges between all pairs of vertices."""
-    vertices = np.concatenate([np.zeros_like(edges[:, :1]), edges], axis=1)
-    return np.linalg.norm(vertices[:, :, None] - vertices[:, None], axis=3)
-
-
-def _facets(edges: Array) -> Array:
-    """Lengths or areas (m, d+1) of the facets opposite the vertices."""
-    lengths = _lengths(edges)
-    if edges.shape[2] == 2:
-        return np.stack([lengths[:, 1, 2], lengths[:, 0, 2], lengths[:, 0, 1]], axis=1)
-    a, b, c = edges[:, 0], edges[:, 1], edges[:, 2]
-    normals = [np.cross(b - a, c - a), np.cross(b, c), np.cross(a, c), np.cross(a, b)]
-    return np.stack([np.linalg.norm(normal, axis=1) / 2 for normal in normals], axis=1)
-
-
-def _longest(edges: Array) -> Array:
-    return _lengths(edges).max(axis=(1, 2))
-
-
-def _inradius(edges: Array, measure: Array) -> Array:
-    """Radius of the inscribed sphere; 0 where the simplex is inverted."""
-    return np.maximum(measure, 0.0) * edges.shape[2] / _facets(edges).sum(axis=1)
-
-
-def _circumradius(edges: Array, measure: Array) -> Array:
-    lengths = _lengths(edges)
-    if edges.shape[2] == 2:
-        return lengths[:, 0, 1] * lengths[:, 0, 2] * lengths[:, 1, 2] / (4 * measure)
-    products = [lengths[:, 0, i] * lengths[:, j, k] for i, j, k in ((1, 2, 3), (2, 1, 3), (3, 1, 2))]
-    a, b, c = products
-    return np.sqrt((a + b + c) * (a + b - c) * (a - b + c) * (b + c - a)) / (24 * measure)
-
-
-def min_angle(edges: Array, measure: Array) -> Array:
-    """Return the smallest angle, dihedral for tetrahedra, in degrees and without sign."""
-    del measure
-    m, d = edges.shape[:2]
-    points = np.concatenate([np.zeros_like(edges[:, :1]), edges], axis=1).reshape(-1, d)
-    return np.degrees(kernels.angles(points, np.arange(m * (d + 1), dtype=np.int32).reshape(m, d + 1), 1)[0])
-
-
-def min_sine(edges: Array, measure: Array) -> Array:
-    """Return the smallest sine of an angle, with the sign of the measure. Source: equation (3.2)."""
-    lengths, facets, d = _lengths(edges), _facets(edges), edges.shape[2]
-    if d == 2:
-        pairs = [lengths[:, i, j] * lengths[:, i, k] for i, j, k in ((0, 1, 2), (1, 0, 2), (2, 0, 1))]
-        return 2 * measure / np.max(pairs, axis=0)
-    # Faces i and j meet in the edge between the other two vertices.
-    shares = []
-    for i, j in combinations(range(4), 2):
-        k, m = {0, 1, 2, 3} - {i, j}
-        shares.append(lengths[:, k, m] / (facets[:, i] * facets[:, j]))
-    return 1.5 * measure * np.min(shares, axis=0)
-
-
-def aspect_ratio(edges: Array, measure: Array) -> Array:
-    """Return the longest edge by the inradius, 1 for the regular simplex."""
-    factor = 2 * (np.sqrt(3) if edges.shape[2] == 2 else np.sqrt(6))
-    return _longest(edges) / (factor * _inradius(edges, measure))
-
-
-def scaled_jacobian(edges: Array, measure: Array) -> Array:
-    """Return the Jacobian by the edges at the worst corner, 1 for the regular simplex."""
-    lengths, d = _lengths(edges), edges.shape[2]
-    corners = [np.prod([lengths[:, i, j] for j in range(d + 1) if j != i], axis=0) for i in range(d + 1)]
-    unit, factorial = (2 / np.sqrt(3), 2) if d == 2 else (np.sqrt(2), 6)
-    return unit * factorial * measure / np.max(corners, axis=0)
-
-
-def mean_ratio(edges: Array, measure: Array) -> Array:
-    """Return Verdict's shape, 1 for the regular simplex and 0 where it is inverted."""
-    squares, positive = (_lengths(edges) ** 2).sum(axis=(1, 2)) / 2, np.maximum(measure, 0.0)
-    if edges.shape[2] == 2:
-        return 4 * np.sqrt(3) * positive / squares
-    return 12 * (3 * positive) ** (2 / 3) / squares
-
-
-def radius_ratio(edges: Array, measure: Array) -> Array:
-    """Return the circumradius by d inradii, 1 for the regular simplex and infinite where it is inverted."""
-    ratio = _circumradius(edges, measure) / (edges.shape[2] * _inradius(edges, measure))
-    return np.where(measure > 0, ratio, np.inf)

@@ -50,7 +50,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     ----------
     mesh : Mesh
     metrics : sequence of str
-        Keys of `METRICS`; the summary holds the worst and the mean value of each.
+        Keys of `METRICS`; the summary holds the worst and the mean value of each, among the elements that have it.
     threads : int
     reference : (k, d) float64, optional
         Where the vertices, in the order of the connectivity, were before the boundary moved.

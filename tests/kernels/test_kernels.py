@@ -15,8 +15,8 @@ from scipy.optimize import nnls
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.quality import formulas
 from meshfix_cli.quality.formulas import evaluate
+from meshfix_cli.quality.simplices import mean_ratio, min_sine
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.solve.strategies import Move
 
@@ -60,7 +60,7 @@ def test_mean_ratio_is_the_metrics_and_its_derivatives_are_right(random: np.rand
             continue
         star = points[faces]
         edges = star - x
-        metric = formulas.mean_ratio(edges, np.linalg.det(edges) / math.factorial(d))
+        metric = mean_ratio(edges, np.linalg.det(edges) / math.factorial(d))
         expected = ((regular / metric) ** d).sum()
         assert value == pytest.approx(expected, rel=1e-12)
         assert again == pytest.approx(expected, rel=1e-12)
@@ -302,7 +302,7 @@ def inverse_ratio(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> 
     corners = points[simplices]
     measure = kernels.measure(points, np.ascontiguousarray(simplices), 1)[0]
     with np.errstate(divide="ignore"):
-        ratio = formulas.mean_ratio(corners[:, 1:] - corners[:, :1], measure)
+        ratio = mean_ratio(corners[:, 1:] - corners[:, :1], measure)
         return float((1 / ratio ** points.shape[1]).sum())
 
 
@@ -326,7 +326,7 @@ def test_only_stars_below_the_threshold_are_raised(mesh: Mesh) -> None:
 def worst_sine(points: NDArray[np.float64], simplices: NDArray[np.int32]) -> float:
     corners = points[simplices]
     measure = kernels.measure(points, np.ascontiguousarray(simplices), 1)[0]
-    return float(formulas.min_sine(corners[:, 1:] - corners[:, :1], measure).min())
+    return float(min_sine(corners[:, 1:] - corners[:, :1], measure).min())
 
 
 def test_validity_is_relative_to_the_simplex() -> None:

@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-from math import sqrt
-
 import numpy as np
 import pytest
+from ideal import REGULAR
 from numpy.typing import NDArray
 from programs import gmsh_session
 
 from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, Element, dimension_of, solved_among
 from meshfix_cli.meshfile.gmsh.cells import ORDER
 
-# Regular elements, in gmsh's order; a pyramid whose corners at the base have edges like those of a cube's corner.
-REGULAR: dict[str, list[tuple[float, ...]]] = {
-    "line": [(0,), (1,)],
-    "triangle": [(0, 0), (1, 0), (0.5, sqrt(3) / 2)],
-    "quad": [(0, 0), (1, 0), (1, 1), (0, 1)],
-    "tetra": [(0, 0, 0), (1, 1, 0), (0, 1, 1), (1, 0, 1)],
-    "pyramid": [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0.5, 0.5, sqrt(0.5))],
-    "wedge": [(0, 0, 0), (1, 0, 0), (0.5, sqrt(3) / 2, 0), (0, 0, 1), (1, 0, 1), (0.5, sqrt(3) / 2, 1)],
-    "hexahedron": [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)],
-}
 linear = pytest.mark.parametrize("element", [ELEMENTS[key] for key in REGULAR], ids=list(REGULAR))
 KNOWN_TO_VTK = [element for element in ELEMENTS.values() if element.vtk is not None]
 KNOWN_TO_GMSH = [element for element in ELEMENTS.values() if element.gmsh is not None]

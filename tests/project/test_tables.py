@@ -13,7 +13,7 @@ from splicing import FORMATS
 from meshfix_cli.cli.untangle import untangle as command
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.formats import OWN
-from meshfix_cli.quality import formulas
+from meshfix_cli.quality import corners, simplices
 from meshfix_cli.quality.metrics import METRICS, NUMBERS
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import Summary
@@ -52,12 +52,14 @@ def test_strategies() -> None:
 
 def test_metrics() -> None:
     assert first_column("quality.md", heading="## Metrics") == list(METRICS)
-    functions = [
-        name for name, value in vars(formulas).items() if getattr(value, "__module__", "") == formulas.__name__
-    ]
-    public = {name for name in functions if not name.startswith("_")} - {"evaluate", "worst_and_mean"}
-    assert public == set(METRICS)
+    for module in (simplices, corners):
+        functions = [
+            name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__
+        ]
+        public = {name for name in functions if not name.startswith("_")} - {"numbered"}
+        assert public == set(METRICS), "all have each: quadrilaterals are among the others"
     assert 'parametrize("name", METRICS)' in (TESTS / "quality/test_metrics.py").read_text()
+    assert "for name, metric in METRICS.items()" in (TESTS / "quality/test_corners.py").read_text()
 
 
 def test_numbers_that_a_requirement_can_name() -> None:

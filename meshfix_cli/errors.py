@@ -3,6 +3,7 @@
 MeshfixError
 ├── InvalidMeshError    the arrays are not a triangle or tetrahedral mesh that can be worked on
 ├── ReadError           the file cannot be read, or holds no such mesh
+├── RequirementError    what is required of a mesh cannot be judged
 └── WriteError          the result cannot be written
 """
 
@@ -20,6 +21,10 @@ class InvalidMeshError(MeshfixError):
 
 class ReadError(MeshfixError):
     """The file cannot be read, or holds no triangle or tetrahedral mesh."""
+
+
+class RequirementError(MeshfixError):
+    """What is required of a mesh cannot be judged."""
 
 
 class WriteError(MeshfixError):

@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from meshfix_cli.errors import WriteError
-from meshfix_cli.mesh.elements import counted
+from meshfix_cli.errors import RequirementError, WriteError
+from meshfix_cli.mesh.elements import counted, words
+from meshfix_cli.quality.metrics import METRICS, having
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import SMOOTH, Smooth, plan
 
@@ -203,6 +204,14 @@ class Judge:
     threads: int = 1
     brief: bool = False
 
+    def check(self, document: Document) -> None:
+        """Refuse, as a RequirementError, to judge a mesh by a metric that none of its elements has."""
+        for one in self.requirements:
+            if one.is_metric and not having(one.name, document.mesh):
+                *others, last = (words(key)[1] for key in METRICS[one.name].elements)
+                have = f"{', '.join(others)} and {last}"
+                raise RequirementError(f"{document.name}: no element has the {one.name} required; only {have} have one")
+
     def report(
         self,
         command: str,
@@ -213,12 +222,19 @@ class Judge:
         reference: NDArray[np.float64] | None = None,
         **more: Any,
     ) -> Report:
-        """Summarise the stages of a mesh, of which the last is the result."""
+        """Summarise the stages of a mesh, of which the last is the result.
+
+        Raises
+        ------
+        RequirementError
+            See `check`.
+        """
         from meshfix_cli.quality.obstacles import find_obstacles
         from meshfix_cli.quality.summary import ceiling, summarise
         from meshfix_cli.report.facts import Report
 
         result = list(stages.values())[-1]
+        self.check(document)
         shown = list(stages)[-1:] if self.brief else list(stages)  # nobody sees the others
         asked = (one.name for one in self.requirements if one.is_metric)
         metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
@@ -267,11 +283,12 @@ def repair(
 
     Raises
     ------
-    WriteError, InvalidMeshError
+    WriteError, InvalidMeshError, RequirementError
         Nothing was written.
     """
     from meshfix_cli.quality.summary import displacement
 
+    judge.check(document)
     threads = judge.threads
     reach = method.reach(document.mesh, threads)
     solve = partial(method.solve, threads=threads) if solve is None else solve

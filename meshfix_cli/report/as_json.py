@@ -8,11 +8,12 @@ from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from meshfix_cli import __version__
-from meshfix_cli.quality.metrics import NUMBERS
+from meshfix_cli.quality.metrics import NUMBERS, having
 from meshfix_cli.quality.summary import BIN_WIDTH, Summary
 from meshfix_cli.report.facts import Report, first_inverted
 
 if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.solve.records import SweepRecord
 
 SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
@@ -38,7 +39,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "mirrored": int(mesh.topology.mirrored.sum()),
         **{name: getattr(result, name) for name in NUMBERS},
         "ceiling": report.ceiling,
-        "quality": {stage: _summary_json(summary) for stage, summary in report.stages.items()},
+        "quality": {stage: _summary_json(summary, mesh) for stage, summary in report.stages.items()},
         "first_inverted": [{"id": i, "centroid": c} for i, c in first_inverted(report)],
         "inverted_without_free_vertex": len(report.obstacles.inverted),
         "obstacles": {
@@ -68,7 +69,7 @@ def history_csv(records: Iterable[SweepRecord]) -> str:
     return "\n".join(lines + [",".join(str(value) for value in row.values()) for row in rows]) + "\n"
 
 
-def _summary_json(summary: Summary) -> dict[str, Any]:
+def _summary_json(summary: Summary, mesh: Mesh) -> dict[str, Any]:
     values: dict[str, Any] = {
         "inverted": summary.inverted,
         "folded": summary.folded,
@@ -81,10 +82,17 @@ def _summary_json(summary: Summary) -> dict[str, Any]:
     }
     if summary.to_reference is not None:
         values["to_reference"] = dict(zip(("smallest", "mean"), summary.to_reference, strict=True))
-    finite = {name: [_finite(v) for v in pair] for name, pair in summary.metrics.items()}
-    return {**values, "metrics": {name: {"worst": w, "mean": m} for name, (w, m) in finite.items()}}
+    values["metrics"] = {name: _metric_json(name, pair, mesh) for name, pair in summary.metrics.items()}
+    return values
+
+
+def _metric_json(name: str, values: tuple[float, float], mesh: Mesh) -> dict[str, float | None]:
+    """Return the worst and the mean value, and of how many elements where not all have the metric."""
+    told = dict(zip(("worst", "mean"), map(_finite, values), strict=True))
+    count = having(name, mesh)
+    return told if count == mesh.topology.m else {**told, "elements": count}
 
 
 def _finite(value: float) -> float | None:
-    """JSON has no infinity, which is the aspect ratio of an inverted element."""
+    """JSON has no infinity, which is the aspect ratio of an inverted element, and no nan."""
     return value if abs(value) < float("inf") else None

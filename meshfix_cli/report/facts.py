@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import counted, words
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality.metrics import having
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import Summary
 
@@ -190,8 +191,9 @@ def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
         worst = ["{:.3f} / {:.3f}".format(*pair) for pair in pairs if pair is not None]
         rows.append(("mean ratio to the reference, worst / mean", worst))
     for name in report.result.metrics:
-        worst = [f"{summary.metrics[name][0]:.3g} / {summary.metrics[name][1]:.3g}" for summary in stages]
-        rows.append((f"{name}, worst / mean", worst))
+        share, form = _share(report, name), "{:.3g} / {:.3g}" if having(name, report.mesh) else "not defined"
+        label = f"{name} of {share}, worst / mean" if share else f"{name}, worst / mean"
+        rows.append((label, [form.format(*summary.metrics[name]) for summary in stages]))
     return rows
 
 
@@ -285,7 +287,14 @@ def required(report: Report) -> Iterator[tuple[bool, str]]:
     """Yield for each requirement whether it is met, and the same in words."""
     for one in report.requirements:
         met = one.holds(report.result)
-        yield met, f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g})"
+        among = f", among {share}" if one.is_metric and (share := _share(report, one.name)) else ""
+        yield met, f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g}{among})"
+
+
+def _share(report: Report, metric: str) -> str:
+    """Say how many elements have a metric; nothing, where all have it."""
+    count, total = having(metric, report.mesh), report.mesh.topology.m
+    return "" if count == total else f"{count:,} of {counted(total, 'element', 'elements')}"
 
 
 def _displaced(facts: Mapping[str, Any]) -> str:

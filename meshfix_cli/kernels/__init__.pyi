@@ -145,9 +145,7 @@ def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
 def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, NDArray[np.uint8]]:
     """Signed measure and validity, each (m,)."""
 
-def judge(
-    points: Float64, codes: Uint8, offsets: Int32, nodes: Int32, threads: int
-) -> tuple[Uint8, Float64, Float64]:
+def judge(points: Float64, codes: Uint8, offsets: Int32, nodes: Int32, threads: int) -> tuple[Uint8, Float64, Float64]:
     """Verdict, signed measure and quality, each (m,), of elements with types (m,) numbered as SHAPES.
 
     Element e has the vertices nodes[offsets[e] : offsets[e + 1]]. Verdicts: 0 valid, 1 not valid inside (or not proved to

@@ -86,6 +86,16 @@ class MixedTopology(Topology):
         mask[self.facets[between]] = True  # -1 marks what is cut off
         return self.of_vertices(mask[:-1])
 
+    def owners(self, simplices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the elements of corner simplices; see `Topology`."""
+        return self.connectivity.owners[simplices]
+
+    def centroids(self, points: NDArray[np.float64], rows: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Return the mean of the vertices (r, d) of some elements; see `Topology`."""
+        mesh = self.connectivity
+        sums = np.add.reduceat(points[mesh.nodes], mesh.node_offsets[:-1])
+        return np.asarray((sums / np.diff(mesh.node_offsets)[:, None])[rows])
+
     def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the two ends (e,) of each edge, once, in the numbers of the connectivity."""
         facets, size = self.facets, (self.facets >= 0).sum(axis=1)

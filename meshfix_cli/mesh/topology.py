@@ -82,6 +82,11 @@ class Topology:
         return self.connectivity.simplices.shape[1] - 1
 
     @property
+    def simplicial(self) -> bool:
+        """Whether all elements are simplices of one type."""
+        return not len(self.connectivity.codes)
+
+    @property
     def element(self) -> Element:
         """The type of the simplices."""
         return SIMPLICES[self.dimension]
@@ -205,6 +210,14 @@ class Topology:
         return vertices | self.of_vertices(
             self.connectivity.grown(vertices[self.connectivity.vertices], rings).view(bool)
         )
+
+    def owners(self, simplices: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the elements of corner simplices, both by their numbers in the connectivity."""
+        return simplices
+
+    def centroids(self, points: NDArray[np.float64], rows: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Return the mean of the vertices (r, d) of some elements, all in the order of the connectivity."""
+        return np.asarray(points[self.connectivity.simplices[rows]].mean(axis=1))
 
     def of_vertices(self, values: NDArray[_T]) -> NDArray[_T]:
         """Return values (k, ...) of the connectivity's vertices as those of all points (n, ...); 0: isolated."""

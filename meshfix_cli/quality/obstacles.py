@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.elements import SIMPLICES
+from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import distinct
 
@@ -58,11 +58,13 @@ class Obstacles:
         if not self:
             return None
         named = np.zeros(mesh.topology.m, dtype=bool)
-        named[self.inverted] = named[self.exclusive] = True
+        named[self.crossing] = named[self.folding] = True
         around = np.zeros(mesh.topology.n, dtype=bool)
-        for pairs in (self.crossing, self.folding):
-            around[mesh.topology.simplices[pairs]] = True
-        named |= around[mesh.topology.simplices].any(axis=1)
+        for block in mesh.topology.blocks:
+            around[block.vertices[named[block.rows]]] = True
+        named[self.inverted] = named[self.exclusive] = True
+        for block in mesh.topology.blocks:
+            named[block.rows] |= around[block.vertices].any(axis=1)
         return named[mesh.topology.connectivity.rows]
 
 
@@ -84,36 +86,67 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     """
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     movable = mesh.along_curve(mesh.movable)
-    inverted = kernels.check(points, connectivity.simplices, threads)[0]
-    free = movable[connectivity.simplices[inverted]].sum(axis=1)
-    facets, owners, shared = connectivity.fixed_facets(movable, threads)
-    rows = connectivity.rows
-
-    def in_one_part(pairs: NDArray[np.int32]) -> NDArray[np.int32]:
-        """Return which simplices have these facets, of pairs of one part."""
-        simplices = owners[pairs]
-        parts = connectivity.component[simplices]
-        within = (parts[:, 0] == parts[:, 1]) & (simplices[:, 0] != simplices[:, 1])
-        return _distinct_pairs(rows[simplices[within]])
-
+    corners = kernels.check(points, connectivity.simplices, threads)[0]
+    free = movable[connectivity.simplices[corners]].sum(axis=1)
+    inverted = mesh.topology.owners(corners)
+    hopeless, rows = inverted[free == 0], connectivity.rows
+    if not mesh.topology.simplicial:
+        stuck = mesh.stuck(threads)
+        wrong = Judged(connectivity, stuck).check(points, threads)[0]
+        hopeless = np.concatenate([hopeless, stuck[wrong]])
+    crossing, folding = _meeting(mesh, points, movable, threads)
     return Obstacles(
-        np.sort(rows[inverted[free == 0]]),
-        distinct(rows[_exclusive(mesh, points, movable, inverted[free == 1], threads)]),
-        in_one_part(kernels.crossings(points, facets, threads)),
-        in_one_part(kernels.folds(points, facets, shared, threads)),
+        distinct(rows[hopeless]),
+        distinct(rows[_exclusive(mesh, points, movable, corners[free == 1], threads)]),
+        crossing,
+        folding,
         np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
     )
+
+
+def _meeting(
+    mesh: Mesh, points: Array, movable: NDArray[np.bool_], threads: int
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return pairs of elements of one part whose fixed facets cross, and such whose facets fold upon each other.
+
+    A quadrilateral need not be flat: its surface is between its triangles by one diagonal and by the other, so both are
+    asked.
+    """
+    connectivity = mesh.topology.connectivity
+    found = []
+    for other_diagonal in (False,) if mesh.topology.simplicial else (False, True):
+        facets, owners, shared = connectivity.fixed_facets(movable, threads, other_diagonal)
+        pairs = kernels.crossings(points, facets, threads), kernels.folds(points, facets, shared, threads)
+        found.append([_in_one_part(mesh, owners[some]) for some in pairs])
+    crossing, folding = found[0]
+    for others in found[1:]:
+        crossing, folding = (_common(*two) for two in zip((crossing, folding), others, strict=True))
+    return crossing, folding
+
+
+def _in_one_part(mesh: Mesh, elements: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the pairs, as rows, of two elements of one part."""
+    parts = mesh.topology.connectivity.component[elements]
+    within = (parts[:, 0] == parts[:, 1]) & (elements[:, 0] != elements[:, 1])
+    return _distinct_pairs(mesh.topology.connectivity.rows[elements[within]])
+
+
+def _common(one: NDArray[np.int32], other: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the pairs (c, 2) that are in both."""
+    both = set(map(tuple, one.tolist())) & set(map(tuple, other.tolist()))
+    return np.array(sorted(both), dtype=np.int32).reshape(-1, 2)
 
 
 def _exclusive(
     mesh: Mesh, points: Array, movable: NDArray[np.bool_], inverted: NDArray[np.int32], threads: int
 ) -> NDArray[np.int32]:
-    """Return rows of the connectivity; some of these inverted simplices, which have one free vertex, are among them."""
+    """Return rows of the connectivity; some of these inverted corner simplices, of one free vertex, are theirs."""
     if not len(inverted):
         return inverted
     stars = mesh.topology.stars(threads)
     corners = stars.simplices[inverted]
-    return kernels.exclusive(points, stars, movable, distinct(corners[movable[corners]]), threads)
+    found = kernels.exclusive(points, stars, movable, distinct(corners[movable[corners]]), threads)
+    return mesh.topology.owners(found)
 
 
 def _distinct_pairs(pairs: NDArray[np.int32]) -> NDArray[np.int32]:
@@ -137,8 +170,8 @@ def _overlapping(
     component = connectivity.component
     if mesh.apart or not component.any():
         return np.empty(0, dtype=np.int32)
-    rows, positions = np.nonzero(connectivity.mates < 0)
-    facets = connectivity.simplices[rows[:, None], np.array(SIMPLICES[points.shape[1]].shape.facets)[positions]]
+    facets, rows, shared = connectivity.fixed_facets(np.zeros_like(movable), threads)
+    facets, rows = np.ascontiguousarray(facets[shared == 0]), rows[shared == 0]
     corners, parts = points[facets], component[rows]
     size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     length = _crossing_lengths(points, facets, parts, size, movable, threads)
@@ -149,7 +182,7 @@ def _overlapping(
     rigid = np.setdiff1d(mesh.stuck(threads), inverted)
     inner = rigid[(length[component[rigid]] > 0) & (largest[rigid] > AS_LARGE * length[component[rigid]])]
     owners = np.concatenate([rows, inner]).astype(np.int32)
-    places = np.concatenate([places, points[connectivity.simplices[inner]].mean(axis=1)])
+    places = np.concatenate([places, mesh.topology.centroids(points, inner)])
     found = kernels.enclosing(points, facets, parts, places, component[owners], threads)
     return np.unique(owners[found >= 0])
 

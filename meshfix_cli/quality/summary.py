@@ -10,8 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import Element
+from meshfix_cli.mesh.judged import INSIDE, VALID, Judged
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.quality.formulas import worst_and_mean
+from meshfix_cli.mesh.topology import Block
+from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
 
 Array = NDArray[np.float64]
@@ -19,6 +22,43 @@ BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
 
 # The smallest angle of a triangle is at most 60 degrees, of a tetrahedron at most acos(1/3) = 70.5.
 BINS = {2: 12, 3: 15}
+JACOBIAN_BINS = 20  # of scaled Jacobians from 0 to 1, where elements are not all simplices
+
+
+@dataclass(frozen=True)
+class Jacobians:
+    """Scaled Jacobians, the smallest of each element's corners, that of an ideal one 1.
+
+    Attributes
+    ----------
+    smallest, mean, percentile_1 : float
+        Over the elements.
+    """
+
+    smallest: float
+    mean: float
+    percentile_1: float
+
+
+@dataclass(frozen=True)
+class Kind:
+    """The elements of one type.
+
+    Attributes
+    ----------
+    element : Element
+    count, inverted, inside : int
+        How many there are, how many of them are not valid, and how many of these are so only inside, not at a corner.
+    smallest, mean : float
+        Of their scaled Jacobians.
+    """
+
+    element: Element
+    count: int
+    inverted: int
+    inside: int
+    smallest: float
+    mean: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +67,10 @@ class Summary:
 
     Angles are those of the shape, without sign; `inverted` counts the elements that are not valid. Where there is a
     reference, `to_reference` are the smallest and the mean of `relative.mean_ratios`.
+
+    Where elements are not all simplices, angles are those of triangles, quadrilaterals and tetrahedra, and NaN where
+    there are none of these; `jacobians` tells of the scaled Jacobians of all elements, of which `histogram` is then,
+    and `kinds` of the elements by their types.
     """
 
     elements: int
@@ -41,6 +85,8 @@ class Summary:
     metrics: dict[str, tuple[float, float]]
     inverted_elements: NDArray[np.int32]
     to_reference: tuple[float, float] | None = None
+    jacobians: Jacobians | None = None
+    kinds: tuple[Kind, ...] = ()
 
 
 def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, reference: Array | None = None) -> Summary:
@@ -61,6 +107,8 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         `folded` counts interior facets with both simplices on one side; `percentile_1` is that of the elements'
         smallest angles; `histogram` counts those in bins of `BIN_WIDTH` degrees.
     """
+    if not mesh.topology.simplicial:
+        return _summarise_elements(mesh, metrics, threads, reference)
     connectivity, bins = mesh.topology.connectivity, BINS[mesh.dimension]
     smallest, histogram, total, inverted, folded, min_measure, largest = kernels.summarise(
         mesh.along_curve(mesh.points), connectivity, bins, math.radians(BIN_WIDTH), threads
@@ -81,6 +129,54 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     )
 
 
+def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, reference: Array | None) -> Summary:
+    """Evaluate a mesh of other elements than simplices of one type."""
+    topology, points = mesh.topology, mesh.along_curve(mesh.points)
+    judged = Judged(topology.connectivity)
+    verdicts, measures = judged.verdicts(points, threads), judged.measures(points, threads)
+    jacobians = evaluate("scaled_jacobian", mesh)
+    angles = [_angles(block, mesh.points, threads) for block in topology.blocks]
+    smallest, largest = (np.concatenate(part) for part in zip(*angles, strict=True))
+    bins = np.clip((jacobians * JACOBIAN_BINS).astype(int), 0, JACOBIAN_BINS - 1)
+    here, there = topology.connectivity.facet_owners, topology.connectivity.facet_mates
+    across = np.where(there >= 0, measures[here[there]], 0.0)
+    by_row = topology.of_rows(verdicts)
+    return Summary(
+        elements=topology.m,
+        inverted=int((verdicts != VALID).sum()),
+        folded=int(((measures[here] < 0) & (across > 0)).sum()),
+        min_measure=float(measures.min()),
+        min_angle=math.degrees(smallest.min()) if len(smallest) else math.nan,
+        max_angle=math.degrees(largest.max()) if len(largest) else math.nan,
+        mean_min_angle=math.degrees(smallest.mean()) if len(smallest) else math.nan,
+        percentile_1=math.degrees(np.percentile(smallest, 1)) if len(smallest) else math.nan,
+        histogram=tuple(np.bincount(bins, minlength=JACOBIAN_BINS).tolist()),
+        metrics={name: worst_and_mean(name, mesh) for name in metrics},
+        inverted_elements=np.flatnonzero(by_row != VALID).astype(np.int32),
+        to_reference=None if reference is None else worst_and_mean_to(mesh, reference),
+        jacobians=Jacobians(float(jacobians.min()), float(jacobians.mean()), float(np.percentile(jacobians, 1))),
+        kinds=tuple(_kind(block, by_row[block.rows], jacobians[block.rows]) for block in topology.blocks),
+    )
+
+
+def _kind(block: Block, verdicts: NDArray[np.uint8], jacobians: Array) -> Kind:
+    wrong, inside = int((verdicts != VALID).sum()), int((verdicts == INSIDE).sum())
+    return Kind(block.element, len(block.rows), wrong, inside, float(jacobians.min()), float(jacobians.mean()))
+
+
+def _angles(block: Block, points: Array, threads: int) -> tuple[Array, Array]:
+    """Return the smallest and the largest angle of elements, in radians, of those types that have them: flat facets."""
+    shape = block.element.shape
+    if len(shape.simplices) == 1:
+        return kernels.angles(points, block.vertices, threads)
+    if shape.dimension == 3:
+        return np.empty(0), np.empty(0)
+    p = points[block.vertices[:, np.array(shape.simplices)]]
+    a, b = p[:, :, 1] - p[:, :, 0], p[:, :, 2] - p[:, :, 0]
+    angles = np.arctan2(np.abs(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]), (a * b).sum(axis=-1))
+    return angles.min(axis=1), angles.max(axis=1)
+
+
 def _percentile(angles: Array, percent: float, histogram: NDArray[np.int64]) -> float:
     """Return a percentile as numpy does, of the bins that it can be in."""
     rank = percent / 100 * (len(angles) - 1)
@@ -91,24 +187,37 @@ def _percentile(angles: Array, percent: float, histogram: NDArray[np.int64]) -> 
 
 
 def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
-    """Return arrays (m,): the signed measure in model units, the smallest angle in degrees, 1 where inverted."""
-    measure, valid = kernels.measure(mesh.points, mesh.topology.simplices, threads)
-    smallest, _ = kernels.angles(mesh.points, mesh.topology.simplices, threads)
-    wrong = (valid == 0) | mesh.topology.misnumbered
-    return {"measure": measure, "min_angle": np.degrees(smallest), "inverted": wrong.astype(np.int32)}
+    """Return arrays (m,): the signed measure in model units, the smallest angle in degrees, 1 where inverted.
+
+    Where elements are not all simplices, the scaled Jacobian takes the place of the angle.
+    """
+    judged, points = Judged(mesh.topology.connectivity), mesh.along_curve(mesh.points)
+    measure, verdicts, quality = (
+        mesh.topology.of_rows(values)
+        for values in (
+            judged.measures(points, threads),
+            judged.verdicts(points, threads),
+            judged.angles(points, threads),
+        )
+    )
+    wrong = (verdicts != VALID) | mesh.topology.misnumbered
+    simplicial = {"min_angle": np.degrees(quality)} if mesh.topology.simplicial else {}
+    other = {} if mesh.topology.simplicial else {"scaled_jacobian": evaluate("scaled_jacobian", mesh)}
+    return {"measure": measure, **simplicial, **other, "inverted": wrong.astype(np.int32)}
 
 
 def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: int = 1) -> NDArray[np.int64]:
-    """Return the rows (at most count,) of the worst simplices: inverted ones, then those of the smallest angles.
+    """Return the rows (at most count,) of the worst elements: inverted ones, then those of the smallest quality.
 
     Parameters
     ----------
     mesh : Mesh
     inverted : (k,) int32
-        Rows of the inverted simplices, as in `Summary.inverted_elements`.
+        Rows of the inverted elements, as in `Summary.inverted_elements`.
     count, threads : int
     """
-    badness = -kernels.angles(mesh.points, mesh.topology.simplices, threads)[0]
+    judged = Judged(mesh.topology.connectivity)
+    badness = -mesh.topology.of_rows(judged.angles(mesh.along_curve(mesh.points), threads))
     badness[inverted] += 2 * math.pi
     return np.argsort(-badness, kind="stable")[:count]
 
@@ -145,7 +254,7 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
 
 
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
-    """Find what no method can raise: the smallest angle among the simplices that have no free vertex.
+    """Find what no method can raise: the smallest quality among the elements that have no free vertex.
 
     Parameters
     ----------
@@ -155,9 +264,11 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     Returns
     -------
     float or None
-        Degrees, dihedral for tetrahedra; None: each simplex has a free vertex.
+        Degrees, dihedral for tetrahedra, or the scaled Jacobian where elements are not all simplices; None: each element
+        has a free vertex.
     """
-    stuck = mesh.topology.connectivity.simplices[mesh.stuck(threads)]
+    stuck = mesh.stuck(threads)
     if len(stuck) == 0:
         return None
-    return float(np.degrees(kernels.angles(mesh.along_curve(mesh.points), stuck, threads)[0].min()))
+    smallest = float(Judged(mesh.topology.connectivity, stuck).angles(mesh.along_curve(mesh.points), threads).min())
+    return math.degrees(smallest) if mesh.topology.simplicial else math.sin(smallest)

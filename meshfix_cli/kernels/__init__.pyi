@@ -148,8 +148,8 @@ def measure(points: Float64, simplices: Int32, threads: int) -> tuple[Float64, N
 def judge(points: Float64, codes: Uint8, offsets: Int32, nodes: Int32, threads: int) -> tuple[Uint8, Float64, Float64]:
     """Verdict, signed measure and quality, each (m,), of elements with types (m,) numbered as SHAPES.
 
-    Element e has the vertices nodes[offsets[e] : offsets[e + 1]]. Verdicts: 0 valid, 1 not valid inside (or not proved to
-    be so), 2 not valid at a corner. Quality is the smallest sine of a simplex, with the sign of its measure, and the
+    Element e has the vertices nodes[offsets[e] : offsets[e + 1]]. Verdicts: 0 valid, 1 not valid inside, or not proved
+    to be so, 2 not valid at a corner. Quality is the smallest sine of a simplex, with the sign of its measure, and the
     smallest scaled Jacobian at the corners of anything else; 0 where an edge has no length.
     """
 

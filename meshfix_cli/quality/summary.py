@@ -192,14 +192,8 @@ def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
     Where elements are not all simplices, the scaled Jacobian takes the place of the angle.
     """
     judged, points = Judged(mesh.topology.connectivity), mesh.along_curve(mesh.points)
-    measure, verdicts, quality = (
-        mesh.topology.of_rows(values)
-        for values in (
-            judged.measures(points, threads),
-            judged.verdicts(points, threads),
-            judged.angles(points, threads),
-        )
-    )
+    passes = judged.measures, judged.verdicts, judged.angles
+    measure, verdicts, quality = (mesh.topology.of_rows(evaluated(points, threads)) for evaluated in passes)
     wrong = (verdicts != VALID) | mesh.topology.misnumbered
     simplicial = {"min_angle": np.degrees(quality)} if mesh.topology.simplicial else {}
     other = {} if mesh.topology.simplicial else {"scaled_jacobian": evaluate("scaled_jacobian", mesh)}
@@ -264,8 +258,8 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     Returns
     -------
     float or None
-        Degrees, dihedral for tetrahedra, or the scaled Jacobian where elements are not all simplices; None: each element
-        has a free vertex.
+        Degrees, dihedral for tetrahedra, or the scaled Jacobian where elements are not all simplices; None: each
+        element has a free vertex.
     """
     stuck = mesh.stuck(threads)
     if len(stuck) == 0:

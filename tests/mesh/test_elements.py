@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ideal import REGULAR
-from numpy.typing import NDArray
+from isoparametric import REGULAR, regular
 from programs import gmsh_session
 
 from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, Element, dimension_of, solved_among
@@ -16,13 +15,9 @@ KNOWN_TO_VTK = [element for element in ELEMENTS.values() if element.vtk is not N
 KNOWN_TO_GMSH = [element for element in ELEMENTS.values() if element.gmsh is not None]
 
 
-def corners_of(element: Element) -> NDArray[np.float64]:
-    return np.array(REGULAR[element.key], dtype=float)
-
-
 @linear
 def test_facets_close_the_element_and_look_outwards(element: Element) -> None:
-    points, shape = corners_of(element), element.shape
+    points, shape = regular(element.key), element.shape
     assert points.shape == (shape.corners, shape.dimension)
     middle = points.mean(axis=0)
     for facet in shape.facets if shape.dimension > 1 else ():
@@ -43,7 +38,7 @@ def test_facets_close_the_element_and_look_outwards(element: Element) -> None:
 
 @linear
 def test_corners_are_positive_and_of_weight_one(element: Element) -> None:
-    points, shape = corners_of(element), element.shape
+    points, shape = regular(element.key), element.shape
     assert {row[0] for row in shape.simplices} >= {0}
     for row in shape.simplices:
         p = points[list(row)]

@@ -105,8 +105,8 @@ int coefficients(std::uint8_t code, const std::array<double, D>* nodes, double* 
     return shape.simplices;
 }
 
-// What rounding leaves in doubt of the determinant of three edges of these lengths, whose ends have errors of the size of
-// `unit`: the bound of `is_barely_valid`.
+// What rounding leaves in doubt of the determinant of three edges of these lengths, whose ends have errors of the size
+// of `unit`: the bound of `is_barely_valid`.
 inline double doubt(double x, double y, double z, double unit) {
     return VALID * (x * y * z + unit * (x * y + y * z + z * x));
 }
@@ -118,8 +118,8 @@ inline double longest(const std::array<Vec<3>, N>& edges) {
     return std::sqrt(most);
 }
 
-// Whether the coefficients of a wedge or hexahedron leave no doubt that it is valid, at its corners too: most are seen to
-// be so.
+// Whether the coefficients of a wedge or hexahedron leave no doubt that it is valid, at its corners too: most are seen
+// to be so.
 inline bool is_valid_at_once(const WedgeParts& w, double unit) {
     const double base = longest(std::array<Vec<3>, 6>{w.a0, w.c0, w.c0 - w.a0, w.a1, w.c1, w.c1 - w.a1});
     const double bound = BEZIER_PLAIN * doubt(base, base, longest(w.q), unit);
@@ -165,7 +165,8 @@ inline HexBox surely(const HexParts<Vec<3>>& e, double unit) {
         for (int y = 0; y < 4; ++y)
             for (int z = 0; z < 4; ++z) {
                 const int I = y % 2 + z % 2, J = x % 2 + z / 2, K = x / 2 + y / 2;
-                b[I + 3 * J + 9 * K] -= SHARE[I] * SHARE[J] * SHARE[K] * doubt(length.x[x], length.y[y], length.z[z], unit);
+                const double share = SHARE[I] * SHARE[J] * SHARE[K];
+                b[I + 3 * J + 9 * K] -= share * doubt(length.x[x], length.y[y], length.z[z], unit);
             }
     return b;
 }
@@ -173,8 +174,8 @@ inline HexBox surely(const HexParts<Vec<3>>& e, double unit) {
 // The first coefficient of one of the 9 lines along a direction, in which neighbours are `stride` apart.
 inline int line_start(int line, int stride) { return line / stride * 3 * stride + line % stride; }
 
-// The stride of the direction in which a box is farthest from being linear: along such a one, its coefficients are bounds
-// that cannot be improved.
+// The stride of the direction in which a box is farthest from being linear: where it is linear, its coefficients are
+// bounds that cannot be improved.
 inline int most_bent(const HexBox& b) {
     int best = 1;
     double most = -1.0;
@@ -305,8 +306,8 @@ void for_each_middle_of_wedge(const Vec<3>* nodes, int node, const F& f) {
     }
 }
 
-// The same of the 20 coefficients of a hexahedron. A rotation moves the node to (0, 0, 0), and the node itself to 0; then
-// a gradient is the sum of the crosses of two edges whose third, which the determinant has too, leaves the node.
+// The same of the 20 coefficients of a hexahedron. A rotation makes the node its first. With that at 0, a gradient is
+// minus the mean of the crosses of two edges where the third of the determinant leaves the node.
 template <class F>
 void for_each_dependent_of_hex(const Vec<3>* nodes, int node, const F& f) {
     const int place = HEX_NODE[node];  // an involution

@@ -89,7 +89,9 @@ auto sines_py(const Matrix<const double>& neighbours, const Matrix<const std::ui
 auto judge_py(const Matrix<const double>& points, const Vector<const std::uint8_t>& codes,
               const Vector<const std::int32_t>& offsets, const Vector<const std::int32_t>& nodes, int threads) {
     const ElementsView elements{codes.data(), offsets.data(), nodes.data(), static_cast<std::int64_t>(codes.shape(0))};
-    Judgement found = with_dimension(points.shape(1), [&](auto d) { return judge<d>(points.data(), elements, threads); });
+    Judgement found = with_dimension(points.shape(1), [&](auto d) {
+        return judge<d>(points.data(), elements, threads);
+    });
     return std::make_tuple(to_numpy(std::move(found.verdict)), to_numpy(std::move(found.measure)),
                            to_numpy(std::move(found.quality)));
 }
@@ -98,7 +100,8 @@ auto judge_py(const Matrix<const double>& points, const Vector<const std::uint8_
 template <int D>
 std::array<Vec<D>, MOST_NODES> nodes_of(const Matrix<const double>& rows) {
     std::array<Vec<D>, MOST_NODES> nodes{};
-    for (std::size_t i = 0; i < std::min<std::size_t>(rows.shape(0), MOST_NODES); ++i) nodes[i] = load<D>(rows.data() + i * D);
+    const auto count = std::min<std::size_t>(rows.shape(0), MOST_NODES);
+    for (std::size_t i = 0; i < count; ++i) nodes[i] = load<D>(rows.data() + i * D);
     return nodes;
 }
 

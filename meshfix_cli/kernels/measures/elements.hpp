@@ -17,7 +17,7 @@ struct ElementsView {
     std::int64_t count;
 };
 
-// Of each element; nothing is NaN.
+// Of each element; nothing is NaN where no coordinate is.
 struct Judgement {
     std::vector<std::uint8_t> verdict;
     std::vector<double> measure, quality;
@@ -31,8 +31,8 @@ double smallest_sine(const std::array<double, D>* nodes) {
     return determinant(e) < 0.0 ? -sine : sine;
 }
 
-// What the smoothing raises: the smallest sine of a simplex, the smallest scaled Jacobian of anything else; 0 where it has
-// none.
+// What the smoothing raises: the smallest sine of a simplex, the smallest scaled Jacobian of anything else; 0 where it
+// has none.
 template <std::size_t D>
 double quality(std::uint8_t code, const std::array<double, D>* nodes) {
     const double value = code == TRIANGLE || code == TETRA ? smallest_sine(nodes) : scaled_jacobian(code, nodes);

@@ -20,7 +20,7 @@ from programs import gmsh_session
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import ELEMENTS, JUDGED
-from meshfix_cli.quality import formulas
+from meshfix_cli.quality import simplices
 
 VALID, INSIDE, CORNER = 0, 1, 2
 CORNERED = ("quad", "pyramid", "wedge", "hexahedron")  # all that is not a simplex
@@ -236,7 +236,7 @@ def test_quality_of_simplices_is_the_smallest_sine(random: np.random.Generator, 
     nodes = perturbed(random, key, 200)
     _, measure, quality = judged(nodes, key)
     edges = nodes[:, 1:] - nodes[:, :1]
-    np.testing.assert_allclose(np.abs(quality), formulas.min_sine(edges, np.abs(measure)), rtol=1e-9)
+    np.testing.assert_allclose(np.abs(quality), simplices.min_sine(edges, np.abs(measure)), rtol=1e-9)
     np.testing.assert_array_equal(np.sign(quality), np.sign(measure))
 
 

@@ -50,10 +50,8 @@ using FaceBlock = Edges<D, Pack>;
 // What LANES faces are where the elements are not all simplices: a whole simplex, or the corner of an element.
 template <int D>
 struct Roles {
-    Pack corner;         // where it is: 0: nowhere, the simplex is an element; 1: the free vertex; 2 + k: vertex k
-    Pack weight;         // of the scaled Jacobian
-    Vec<D, Pack> pull;   // weights of the squared edges from the free vertex in |A W^-1|^2, see shapes.hpp
-    Pack held;           // what the edges of the face add to that
+    Pack corner;  // where it is: 0: nowhere, the simplex is an element; 1: the free vertex; 2 + k: vertex k
+    Pack weight;  // of the scaled Jacobian
 };
 
 template <int D>
@@ -100,23 +98,9 @@ struct Star {
             role.weight[lane] = shape.weight;
             role.corner[lane] = 0.0;
             if (shape.simplices > 1) role.corner[lane] = position_of_free == 0 ? 1.0 : 0.0;
-            role.held[lane] = 0.0;
-            for (int k = 0; k < D; ++k) {
+            for (int k = 0; k < D; ++k)
                 if (shape.simplices > 1 && face[k] == 0) role.corner[lane] = 2.0 + k;
-                role.pull[k][lane] = edge_weight(shape, position_of_free, face[k]);
-                for (int l = 0; l < k; ++l) {
-                    const Vec<D> edge = neighbours[faces[face_at(i) + k]] - neighbours[faces[face_at(i) + l]];
-                    role.held[lane] += edge_weight(shape, face[k], face[l]) * norm2(edge);
-                }
-            }
         }
-    }
-
-    // The weight of a squared edge in the sum over G_ij a_i.a_j, the a_i from position 0 of a corner simplex.
-    static double edge_weight(const ElementShape& shape, int i, int j) {
-        if (i > 0 && j > 0) return -shape.gram[i - 1][j - 1];
-        const int k = std::max(i, j) - 1;
-        return shape.gram[k][0] + shape.gram[k][1] + shape.gram[k][2];
     }
 
     void fill_blocks() {
@@ -141,14 +125,6 @@ struct Star {
 
     Vec<D> to_global(const Vec<D>& x) const { return origin + unit * x; }
     Vec<D> to_local(const Vec<D>& p) const { return (1.0 / unit) * (p - origin); }
-
-    // |A W^-1|^2 of each lane of a block, but for a constant where all are simplices.
-    Pack squared_edges(std::size_t b, const Edges<D, Pack>& e) const {
-        if (roles.empty()) return sum_of_squared_edges<D>(e);
-        Pack sum = roles[b].held;
-        for (int k = 0; k < D; ++k) sum += roles[b].pull[k] * norm2(e[k]);
-        return sum;
-    }
 
     // The nearest position that the global coordinates can hold: what is judged is what will be stored.
     Vec<D> snap(const Vec<D>& x) const { return to_local(to_global(x)); }

@@ -1,6 +1,6 @@
 // Simplices that exclude each other: they have one and the same free vertex, and no position of it makes all of them
 // positive. The dual of the linear programme of section 2 certifies that: weights y >= 0 of these simplices with
-// sum y_i n_i = 0 and sum y_i c_i < 0.
+// sum y_i n_i = 0 and sum y_i c_i <= 0, to rounding: what is positive by less could not be told to be valid.
 #pragma once
 
 #include <vector>
@@ -34,13 +34,16 @@ void find_exclusive(const Connectivity& mesh, const StarsView& stars, const doub
     star.fill_blocks();
     LinearProgram<D> program;
     program.set(star, false);
-    if (program.solve() != LpStatus::optimal || !(program.pi[D] < -LP_IMPOSSIBLE)) return;
+    if (program.solve() != LpStatus::optimal) return;
     std::vector<std::int32_t> certificate;
+    double largest = 0.0;
     for (int row = 0; row <= D; ++row) {
         if (!(program.weight(row) > LP_PIVOT)) continue;
         if (program.basis[row] >= program.faces_count) return;  // a side of the box: farther away it may be possible
         certificate.push_back(owners[std::min(program.basis[row], star.faces_count - 1)]);
+        largest = std::max(largest, std::fabs(program.cost(program.basis[row])));
     }
+    if (program.pi[D] > LP_IMPOSSIBLE * largest) return;
     found.insert(found.end(), certificate.begin(), certificate.end());
 }
 

@@ -108,6 +108,8 @@ struct LinearProgram {
         return a;
     }
 
+    double cost(int j) const { return j < faces_count ? costs[j / LANES][j % LANES] : box; }
+
     // The dual certificate: weight of basic column `row`; c.y = t by construction, feasible where y >= 0.
     double weight(int row) const { return inverse[row][D]; }
 
@@ -180,8 +182,6 @@ struct LinearProgram {
             normals[b] = scale * normals[b];
         }
     }
-
-    double cost(int j) const { return j < faces_count ? costs[j / LANES][j % LANES] : box; }
 
     Vec<D> normal(int j) const {
         Vec<D> n;

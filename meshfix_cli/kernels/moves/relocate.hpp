@@ -206,7 +206,8 @@ struct Relocation {
             const Vec<D> there = star.to_global(x);
             return star.to_local(parameters.max_move < INFINITY ? within_reach(v, there) : there);
         };
-        return take(v, improve_mean_ratio<D>(star, quality, floor, reachable));
+        return take(v, star.roles.empty() ? improve_mean<D, MeanRatio<D>>(star, quality, floor, reachable)
+                                          : improve_mean<D, ElementRatio<D>>(star, quality, floor, reachable));
     }
 
     // As far back to the start as makes no determinant smaller than `min_det`; all the way to its very bits.

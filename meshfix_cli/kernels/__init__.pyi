@@ -263,6 +263,7 @@ def foldover_energy(
 def shape_energy(
     points: Float64,
     simplices: Int32,
+    corners: Float64,
     free: int,
     goal: float,
     floor: float,
@@ -270,11 +271,15 @@ def shape_energy(
     weight: float,
     threads: int,
 ) -> tuple[float, Float64]:
-    """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge."""
+    """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge.
+
+    Simplices that are corners of elements have their weights in `corners` (m,), others 0; (0,): none is a corner.
+    """
 
 def shaped(
     points: Float64,
     simplices: Int32,
+    corners: Float64,
     free: int,
     goal: float,
     floor: float,

@@ -122,7 +122,7 @@ class Run:
 
     def enter(self, phase: Phase) -> bool:
         """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
-        if self.mendable.simplicial if phase.inside else phase.layers and not self.mendable.simplicial:
+        if self.mendable.simplicial if phase.elements else phase.layers and not self.mendable.simplicial:
             return False
         if phase.smooths:
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
@@ -313,7 +313,7 @@ class Run:
 
     def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
-        if self.max_move < math.inf or self.left or not (self.free.any() and self.mendable.simplicial):
+        if self.max_move < math.inf or self.left or not self.free.any():
             return
         angles = self._angles(self.points)
         smallest = self._least(angles)

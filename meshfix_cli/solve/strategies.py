@@ -79,8 +79,8 @@ class Phase:
         has one takes the place of the other, where there is a reference or layers were followed.
     layers : bool
         The function is that of `layers.py`, which makes up a reference.
-    inside : bool
-        For elements that may be invalid inside though no corner is: simplices never are.
+    elements : bool
+        For meshes of other elements than simplices alone.
     """
 
     name: str
@@ -94,7 +94,7 @@ class Phase:
     shapes: Literal["first", "lost", "risen"] | None = None
     to_reference: Literal["", "follow", "mend", "approach"] = ""
     layers: bool = False
-    inside: bool = False
+    elements: bool = False
 
     @property
     def smooths(self) -> bool:
@@ -109,7 +109,7 @@ _STALLING = replace(_LAPLACIAN, max_sweeps=SWEEPS, until="stalled")
 _LP_INVALID = Phase("LP on invalid stars", _LP_CYCLES, 300, "stalled", only_invalid=True, from_best=True)
 _LP_COEFFICIENTS = Phase(
     "LP on coefficients", (Move.UNTANGLE_COEFFICIENTS,), SWEEPS, until="stalled", only_invalid=True, from_best=True,
-    inside=True,
+    elements=True,
 )  # fmt: skip
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
@@ -203,7 +203,8 @@ def plan(
     if smooth == "best":
         return (*untangling, passes, replace(_MORE, until="goal"), *_BEST)
     if smooth == "auto":
-        return (*untangling, replace(passes, rings=RINGS), *(() if only_invalid else (_MORE,)))
+        more = () if only_invalid else (replace(_SHAPE, rings=RINGS, elements=True), _MORE)
+        return (*untangling, replace(passes, rings=RINGS), *more)
     return (*untangling, replace(passes, max_sweeps=smooth))
 
 

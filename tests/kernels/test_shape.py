@@ -14,6 +14,7 @@ from meshfix_cli.solve.region import Region
 from meshfix_cli.solve.shape import Goal, shaped
 
 GOAL = (30.0, 12.0, 0.0, 1.5)  # degrees, degrees, measure, weight
+NO_CORNERS = np.empty(0)
 
 
 def region_of(mesh: Mesh) -> tuple[np.ndarray, Region]:
@@ -30,7 +31,7 @@ def valid(mesh: Mesh) -> Mesh:
 def test_the_energy_is_that_of_the_metrics(mesh: Mesh) -> None:
     start = valid(mesh)
     points, region = region_of(start)
-    energy, _ = kernels.shape_energy(points, region.simplices, len(region.moving), *GOAL, 1)
+    energy, _ = kernels.shape_energy(points, region.simplices, NO_CORNERS, len(region.moving), *GOAL, 1)
     own = start.movable[start.topology.simplices].any(axis=1)
     ratio, angle = evaluate("mean_ratio", start)[own], evaluate("min_angle", start)[own]
     goal, floor, _, weight = GOAL
@@ -45,7 +46,7 @@ def test_the_gradient_is_right(mesh: Mesh, share: float, random: np.random.Gener
     points, region = region_of(start)
     free, d = len(region.moving), points.shape[1]
     goal = (*GOAL[:2], share * start.check()[1], GOAL[3])
-    _, gradient = kernels.shape_energy(points, region.simplices, free, *goal, 1)
+    _, gradient = kernels.shape_energy(points, region.simplices, NO_CORNERS, free, *goal, 1)
     centre = points.mean(axis=0)
     unit = np.linalg.norm(points - centre, axis=1).max() / len(points) ** (1 / d)
     for _ in range(5):
@@ -54,13 +55,13 @@ def test_the_gradient_is_right(mesh: Mesh, share: float, random: np.random.Gener
         for step in (1e-7, -1e-7):
             there = points.copy()
             there[:free] += step * unit * way
-            ends.append(kernels.shape_energy(there, region.simplices, free, *goal, 1)[0])
+            ends.append(kernels.shape_energy(there, region.simplices, NO_CORNERS, free, *goal, 1)[0])
         assert (gradient * way).sum() == pytest.approx((ends[0] - ends[1]) / 2e-7, rel=1e-4)
 
 
 def test_no_step_leads_out_of_the_valid_meshes(mesh: Mesh) -> None:
     points, region = region_of(tangle(mesh, 30, 2))
-    assert kernels.shape_energy(points, region.simplices, len(region.moving), *GOAL, 1)[0] == math.inf
+    assert kernels.shape_energy(points, region.simplices, NO_CORNERS, len(region.moving), *GOAL, 1)[0] == math.inf
     start = valid(mesh)
     free = start.along_curve(start.movable)
     after = start.with_vertices(shaped(start.along_curve(start.points), start.topology.stars(1), free, Goal(25.0), 1))

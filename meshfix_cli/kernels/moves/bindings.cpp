@@ -150,17 +150,18 @@ auto foldover_energy_py(const Matrix<const std::int32_t>& simplices, const Matri
 
 template <int D>
 Shape<D> make_shape(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                    std::int64_t free, double goal, double floor, double measure, double weight, int threads) {
+                    const Vector<const double>& corners, std::int64_t free, double goal, double floor, double measure,
+                    double weight, int threads) {
     return {points.data(), static_cast<std::int64_t>(points.shape(0)), free, simplices.data(),
-            static_cast<std::int64_t>(simplices.shape(0)), {goal, floor, measure, weight}, threads};
+            static_cast<std::int64_t>(simplices.shape(0)), {corners.data(), corners.data() + corners.size()}, {goal, floor, measure, weight}, threads};
 }
 
 auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                     std::int64_t free, double goal, double floor, double measure, double weight, int threads) {
+                     const Vector<const double>& corners, std::int64_t free, double goal, double floor, double measure, double weight, int threads) {
     const std::size_t d = points.shape(1);
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
     const double value = with_dimension(d, [&](auto dimension) {
-        auto shape = make_shape<dimension>(points, simplices, free, goal, floor, measure, weight, threads);
+        auto shape = make_shape<dimension>(points, simplices, corners, free, goal, floor, measure, weight, threads);
         const Numbers x = shape.start();
         return shape(x.data(), gradient.data());
     });
@@ -168,11 +169,11 @@ auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std:
 }
 
 // The free points where so many iterations end.
-auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, std::int64_t free,
-               double goal, double floor, double measure, double weight, int iterations, int threads) {
+auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
+               const Vector<const double>& corners, std::int64_t free, double goal, double floor, double measure, double weight, int iterations, int threads) {
     const std::size_t d = points.shape(1);
     return to_numpy(with_dimension(d, [&](auto dimension) {
-        Lbfgs<Shape<dimension>> lbfgs(make_shape<dimension>(points, simplices, free, goal, floor, measure, weight, threads), free * dimension,
+        Lbfgs<Shape<dimension>> lbfgs(make_shape<dimension>(points, simplices, corners, free, goal, floor, measure, weight, threads), free * dimension,
                               threads);
         lbfgs.start();
         lbfgs.minimise(iterations);
@@ -254,9 +255,9 @@ void bind_moves(nb::module_& m) {
           "threads"_a);
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
-    m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "free"_a, "goal"_a,
+    m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(), "free"_a, "goal"_a,
           "floor"_a, "measure"_a, "weight"_a, "threads"_a);
-    m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "free"_a, "goal"_a, "floor"_a,
+    m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a,
           "measure"_a, "weight"_a, "iterations"_a, "threads"_a);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;

@@ -6,6 +6,9 @@
 //
 // t the smallest angle in degrees; the goal lifts the few that are worse than the others, the floor holds the worst, and
 // the last term the smallest determinant, where `least` is positive.
+// Where elements are not all simplices, of their corners
+//         - RATIO q + weight (...), q the scaled Jacobian, t its arc sine in degrees.
+//
 // It is infinite where a simplex has no positive determinant, so that a minimiser that starts from a valid mesh never
 // leaves those. The mean ratio is that of P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
 #pragma once
@@ -49,11 +52,12 @@ inline void add_slopes_of_angle(const Edges<3>& e, std::size_t k, double factor,
 template <int D>
 class Shape {
    public:
-    // points (n, D), the `free` ones first; simplices (m, D+1).
+    // points (n, D), the `free` ones first; simplices (m, D+1); corners (m,): the weights of the scaled Jacobians at the
+    // first vertices of those that are corners of elements, 0 for others; or none.
     Shape(const double* points, std::int64_t n, std::int64_t free, const std::int32_t* simplices, std::int64_t m,
-          ShapeGoal goal, int threads)
-        : assembly_(simplices, m, n), parts_(assembly_.items()), free_(free), threads_(threads), goal_(goal),
-          points_(points, points + n * D) {
+          std::vector<double> corners, ShapeGoal goal, int threads)
+        : assembly_(simplices, m, n), corners_(std::move(corners)), parts_(assembly_.items()), free_(free),
+          threads_(threads), goal_(goal), points_(points, points + n * D) {
         for (std::int64_t i = 0; i < n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(n);
         double size2 = 0.0;
         for (std::int64_t v = 0; v < n; ++v) size2 = larger(size2, norm2(load<D>(points + v * D) - origin_));
@@ -99,6 +103,10 @@ class Shape {
             const auto cosine = cosines<D>(e);
             const int count = static_cast<int>(std::min<std::int64_t>(LANES, end - s));
             for (int i = 0; i < count; ++i) {
+                if (!corners_.empty() && corners_[s + i] > 0.0) {
+                    value[i] = of_corner(e, i, corners_[s + i], slopes);
+                    continue;
+                }
                 std::size_t k = 0;
                 for (std::size_t other = 1; other < cosine.size(); ++other)
                     if (cosine[other][i] > cosine[k][i]) k = other;
@@ -139,15 +147,43 @@ class Shape {
         return select(det > zero, value, one / zero);
     }
 
-    // Of lane i, whose smallest angle is the k-th.
-    double of_angle(const Edges<D, Pack>& edges, int i, std::size_t k, double cosine, Corners<D, Pack>& slopes) const {
-        constexpr double DEGREE = 57.29577951308232;
-        if (!(std::fabs(cosine) < 1.0)) return INFINITY;
-        const double angle = DEGREE * std::acos(cosine), missing = larger(0.0, goal_.degrees - angle);
+    // Of lane i, which is the corner of an element; with E = q = weight det / (product of the edges).
+    double of_corner(const Edges<D, Pack>& edges, int i, double weight, Corners<D, Pack>& slopes) const {
+        const Edges<D> e = lane(edges, i);
+        const double det = determinant(e);
+        if (!(det > 0.0)) return INFINITY;
+        double product2 = 1.0;
+        for (int k = 0; k < D; ++k) product2 *= norm2(e[k]);
+        const double q = weight * det / std::sqrt(product2);
+        const double angle = DEGREE * std::asin(smaller(q, 1.0)), missing = larger(0.0, goal_.degrees - angle);
         const double below = SHAPE_FLOOR * larger(0.0, goal_.floor - angle);
+        double slope = -SHAPE_RATIO;
+        if (missing + below > 0.0)
+            slope -= 2.0 * goal_.weight * (missing + below) * DEGREE / std::sqrt(larger(1.0 - q * q, 1e-6));
+        const Edges<D> normals = determinant_slopes(e);
+        Vec<D> first{};
+        for (int k = 0; k < D; ++k) {
+            const Vec<D> mine = (slope * q) * ((1.0 / det) * normals[k] - (1.0 / norm2(e[k])) * e[k]);
+            first = first - mine;
+            for (int x = 0; x < D; ++x) slopes[k + 1][x][i] = mine[x];
+        }
+        for (int x = 0; x < D; ++x) slopes[0][x][i] = first[x];
+        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) - SHAPE_RATIO * q;
+    }
+
+    static Edges<D> lane(const Edges<D, Pack>& edges, int i) {
         Edges<D> e;
         for (int edge = 0; edge < D; ++edge)
             for (int x = 0; x < D; ++x) e[edge][x] = edges[edge][x][i];
+        return e;
+    }
+
+    // Of lane i, whose smallest angle is the k-th.
+    double of_angle(const Edges<D, Pack>& edges, int i, std::size_t k, double cosine, Corners<D, Pack>& slopes) const {
+        if (!(std::fabs(cosine) < 1.0)) return INFINITY;
+        const double angle = DEGREE * std::acos(cosine), missing = larger(0.0, goal_.degrees - angle);
+        const double below = SHAPE_FLOOR * larger(0.0, goal_.floor - angle);
+        const Edges<D> e = lane(edges, i);
         Corners<D> mine{};
         add_slopes_of_angle(e, k, -DEGREE * (SHAPE_ANGLE + 2.0 * goal_.weight * (missing + below)), mine);
         for (int corner = 0; corner <= D; ++corner)
@@ -155,8 +191,10 @@ class Shape {
         return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) - SHAPE_ANGLE * angle;
     }
 
+    static constexpr double DEGREE = 57.29577951308232;
+
     Assembly<D> assembly_;
-    std::vector<double> parts_;
+    std::vector<double> corners_, parts_;
     std::int64_t free_;
     int threads_;
     ShapeGoal goal_;

@@ -201,8 +201,11 @@ def linear_program(
 def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
     """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
 
-def embedding(points: Float64, mesh: Connectivity, free: NDArray[np.bool_], threads: int) -> Float64:
-    """Return the points (n, d) with each free one (n,) at the mean of its neighbours; needs the stars."""
+def embedding(points: Float64, mesh: Connectivity, free: NDArray[np.bool_], weights: Float64, threads: int) -> Float64:
+    """Return the points (n, d) with each free one (n,) at the mean of its neighbours; needs the stars.
+
+    There is a weight for each of `mesh.neighbours`; (0,): all are the same.
+    """
 
 def folds(points: Float64, facets: Int32, shared: Uint8, threads: int) -> Int32:
     """Pairs (k, 2) of oriented facets (f, d) that lie upon each other, their insides on the same side.

@@ -36,6 +36,8 @@ class Shape:
     simplices : tuple of tuples of int
         The corner simplices: each a node and its neighbours in the element, in the order that makes all determinants
         positive in a valid element.
+    parallel : tuple of tuples of (int, int)
+        The edges, those together that are parallel in the ideal element.
     ideal : tuple of tuples of float
         The edges of a corner simplex from its first node, in the ideal element.
     """
@@ -47,6 +49,7 @@ class Shape:
     facets: Rows = ()
     simplices: Rows = ()
     ideal: tuple[tuple[float, ...], ...] = ()
+    parallel: tuple[tuple[tuple[int, int], ...], ...] = ()
 
     @property
     def weight(self) -> float:
@@ -107,25 +110,30 @@ class Element:
 _VERTEX = Shape("vertex", "vertices", 0, 1)
 _LINE = Shape("line", "lines", 1, 2, ((1,), (0,)), ((0, 1),))
 _TRIANGLE = Shape(
-    "triangle", "triangles", 2, 3, ((1, 2), (2, 0), (0, 1)), ((0, 1, 2),), ((1, 0), (0.5, math.sqrt(0.75)))
+    "triangle", "triangles", 2, 3, ((1, 2), (2, 0), (0, 1)), ((0, 1, 2),), ((1, 0), (0.5, math.sqrt(0.75))),
+    (((0, 1),), ((1, 2),), ((2, 0),)),
 )  # fmt: skip
 _QUAD = Shape(
     "quadrilateral", "quadrilaterals", 2, 4, ((0, 1), (1, 2), (2, 3), (3, 0)),
     ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)), ((1, 0), (0, 1)),
+    (((0, 1), (3, 2)), ((0, 3), (1, 2))),
 )  # fmt: skip
 _TETRA = Shape(
     "tetrahedron", "tetrahedra", 3, 4, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)), ((0, 1, 2, 3),),
     ((1, 0, 0), (0.5, math.sqrt(0.75), 0), (0.5, math.sqrt(1 / 12), math.sqrt(2 / 3))),
+    (((0, 1),), ((0, 2),), ((0, 3),), ((1, 2),), ((1, 3),), ((2, 3),)),
 )  # fmt: skip
 _PYRAMID = Shape(
     "pyramid", "pyramids", 3, 5, ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
     ((1, 0, 0), (0, 1, 0), (0.5, 0.5, math.sqrt(0.5))),
+    (((0, 1), (3, 2)), ((0, 3), (1, 2)), ((0, 4),), ((1, 4),), ((2, 4),), ((3, 4),)),
 )  # fmt: skip
 _WEDGE = Shape(
     "wedge", "wedges", 3, 6, ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
     ((1, 0, 0), (0.5, math.sqrt(0.75), 0), (0, 0, 1)),
+    (((0, 1), (3, 4)), ((1, 2), (4, 5)), ((2, 0), (5, 3)), ((0, 3), (1, 4), (2, 5))),
 )  # fmt: skip
 _HEXAHEDRON = Shape(
     "hexahedron", "hexahedra", 3, 8,
@@ -135,6 +143,7 @@ _HEXAHEDRON = Shape(
         (4, 7, 5, 0), (5, 4, 6, 1), (6, 5, 7, 2), (7, 6, 4, 3),
     ),
     ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    (((0, 1), (3, 2), (4, 5), (7, 6)), ((0, 3), (1, 2), (4, 7), (5, 6)), ((0, 4), (1, 5), (2, 6), (3, 7))),
 )  # fmt: skip
 _PIXEL = Shape("pixel", "pixels", 2, 0)  # VTK's own order of a rectangle's and a box's corners
 _VOXEL = Shape("voxel", "voxels", 3, 0)

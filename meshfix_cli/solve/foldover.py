@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import JUDGED
+from meshfix_cli.solve.chords import inverse_lengths
 from meshfix_cli.solve.region import Region
 
 Array = NDArray[np.float64]
@@ -164,13 +165,15 @@ def minimisations_to(
 def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int = 1) -> Array:
     """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
 
+    Where elements are not all simplices, the neighbours have the weights of `inverse_lengths`.
+
     Returns
     -------
     (n, d) float64
         In the plane valid wherever the boundary is convex. Source: W. T. Tutte, "How to draw a graph", Proceedings of
         the London Mathematical Society 13 (1963).
     """
-    return kernels.embedding(start, mesh, free, threads)
+    return kernels.embedding(start, mesh, free, inverse_lengths(start, mesh, free), threads)
 
 
 class _Region(Region):

@@ -61,14 +61,14 @@ def shaped(
     region = Region(mesh, free)
     moved = points.copy()
     moved[region.moving] = kernels.shaped(
-        points[region.vertices], region.simplices, _corners(mesh, region), len(region.moving), goal.angle, goal.floor, goal.measure, WEIGHT,
-        ITERATIONS, threads,
+        points[region.vertices], region.simplices, _corners(mesh, region), len(region.moving), goal.angle, goal.floor,
+        goal.measure, WEIGHT, ITERATIONS, threads,
     )  # fmt: skip
     return _retreated(points, moved, mesh, region.global_simplices, goal.measure, threads)
 
 
 def _corners(mesh: kernels.Connectivity, region: Region) -> Array:
-    """Return the weights (s,) of the scaled Jacobians of the region's simplices, 0 for whole ones; (0,) for simplices."""
+    """Return the weights (s,) of scaled Jacobians, 0 for whole simplices; (0,) where all are."""
     weights = np.array([one.shape.weight if len(one.shape.simplices) > 1 else 0.0 for one in JUDGED])
     return weights[mesh.codes[mesh.owners[region.rows]]] if len(mesh.codes) else np.empty(0)
 

@@ -1,4 +1,4 @@
-// Each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
+// Each free vertex at the mean of its neighbours, by weights: the solution of the graph's Laplace equation.
 //
 // Source: W. T. Tutte, "How to draw a graph", Proceedings of the London Mathematical Society 13 (1963); conjugate
 // gradients, preconditioned by the numbers of neighbours.
@@ -17,7 +17,9 @@ namespace meshfix {
 template <int D>
 class Embedding {
  public:
-    Embedding(StarsView stars, const double* points, const std::uint8_t* free, std::int64_t n, int threads)
+    // weights: of the star's neighbours, one star behind the other; null: all are 1.
+    Embedding(StarsView stars, const double* points, const std::uint8_t* free, const double* weights, std::int64_t n,
+              int threads)
         : threads_(threads) {
         std::vector<std::int32_t> number(n, -1);
         for (std::int64_t v = 0; v < n; ++v) {
@@ -28,17 +30,21 @@ class Embedding {
         set_middle(stars, points, number);
         for (std::int32_t v : vertices_) {
             Vec<D> held{};
+            double count = 0.0;
             for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
                 const std::int32_t other = stars.neighbours[i];
+                const double weight = weights == nullptr ? 1.0 : weights[i];
+                count += weight;
                 if (number[other] >= 0) {
                     neighbours_.push_back(number[other]);
+                    weights_.push_back(weight);
                 } else {
-                    held = held + (load<D>(points + static_cast<std::int64_t>(other) * D) - middle_);
+                    held = held + weight * (load<D>(points + static_cast<std::int64_t>(other) * D) - middle_);
                 }
             }
             held_.push_back(held);
             offsets_.push_back(static_cast<std::int32_t>(neighbours_.size()));
-            counts_.push_back(stars.neighbour_offsets[v + 1] - stars.neighbour_offsets[v]);
+            counts_.push_back(count);
         }
     }
 
@@ -96,21 +102,22 @@ class Embedding {
     // Times the graph's Laplacian.
     void apply(const Numbers& from, Numbers& to) const {
         for_each([&](std::int64_t v) {
-            Vec<D> sum = static_cast<double>(counts_[v]) * load<D>(from.data() + v * D);
+            Vec<D> sum = counts_[v] * load<D>(from.data() + v * D);
             for (std::int32_t i = offsets_[v]; i < offsets_[v + 1]; ++i)
-                sum = sum - load<D>(from.data() + static_cast<std::int64_t>(neighbours_[i]) * D);
+                sum = sum - weights_[i] * load<D>(from.data() + static_cast<std::int64_t>(neighbours_[i]) * D);
             put_at(sum, to, v);
         });
     }
 
     void divide(const Numbers& from, Numbers& to) const {
         for_each([&](std::int64_t v) {
-            put_at((1.0 / static_cast<double>(counts_[v])) * load<D>(from.data() + v * D), to, v);
+            put_at((1.0 / counts_[v]) * load<D>(from.data() + v * D), to, v);
         });
     }
 
-    std::vector<std::int32_t> vertices_, offsets_{0}, neighbours_, counts_;  // rows: of free neighbours
-    std::vector<Vec<D>> held_;                                              // the sum of the others
+    std::vector<std::int32_t> vertices_, offsets_{0}, neighbours_;  // rows: of free neighbours
+    std::vector<double> weights_, counts_;                          // of these, and the sum over all
+    std::vector<Vec<D>> held_;                                      // the sum of the others
     Vec<D> middle_{};
     int threads_;
 };

@@ -116,7 +116,7 @@ def test_a_hexahedron_that_is_invalid_inside_only_is_told(random: np.random.Gene
         found.add(int(verdict))
         if verdict == INSIDE:
             assert (np.linalg.det(_corner_edges(nodes)) > 0).all()
-            assert jacobians(nodes, "hexahedron", np.arange(8)[None], steps=15).min() <= 0
+            assert jacobians(nodes, "hexahedron", np.arange(8, dtype=np.int32)[None], steps=15).min() <= 0
     assert found == {VALID, INSIDE, CORNER}
 
 

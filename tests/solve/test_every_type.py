@@ -14,7 +14,7 @@ from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.solve.foldover import embedding
 from meshfix_cli.solve.records import Outcome
-from meshfix_cli.solve.strategies import Move
+from meshfix_cli.solve.strategies import Move, Smooth
 
 # Of the scaled Jacobians of the mesh before: the smallest, and the mean where nothing turned.
 SMALLEST, MEAN = 0.45, 0.9
@@ -64,7 +64,7 @@ def test_each_strategy_ends_with_a_certificate_or_says_so(name: str, strategy: s
 
 @pytest.mark.parametrize("name", ["quads and triangles", "hex shell", "wedges and tets", "every solid"])
 @pytest.mark.parametrize("smooth", ["auto", "best"])
-def test_same_bits_for_any_threads(name: str, smooth: str) -> None:
+def test_same_bits_for_any_threads(name: str, smooth: Smooth) -> None:
     mesh = built(name)
     points = tangles(name, mesh.points, mesh.movable, mesh.mean_edge_length())["P=100 D=8h"]
     ends = {untangle(mesh.with_points(points), smooth=smooth, threads=n).after.points.tobytes() for n in (1, 2, 3)}
@@ -169,7 +169,7 @@ def test_the_active_set_method_finds_the_best_place_of_a_vertex(random: np.rando
             continue
         points = once(mesh, Move.RAISE_SMALLEST)
 
-        def lost(x: NDArray[np.float64], mesh: Mesh = mesh) -> float:
+        def lost(x: NDArray[np.float64], mesh: Mesh = mesh, vertex: int = vertex) -> float:
             there = mesh.points.copy()
             there[vertex] = x
             return -smallest(mesh.with_points(there))

@@ -40,6 +40,10 @@ class Shape:
         The edges, those together that are parallel in the ideal element.
     ideal : tuple of tuples of float
         The edges of a corner simplex from its first node, in the ideal element.
+    mirrored : tuple of int
+        An order of the nodes that has the other orientation: the first two change places, and what lies over or beside
+        them as they do. So those that programs repeat in an element of fewer corners, as the last two of a
+        quadrilateral, stay where they are looked for; VTK's pixels and voxels turn by the same order.
     """
 
     name: str
@@ -50,6 +54,7 @@ class Shape:
     simplices: Rows = ()
     ideal: tuple[tuple[float, ...], ...] = ()
     parallel: tuple[tuple[tuple[int, int], ...], ...] = ()
+    mirrored: tuple[int, ...] = ()
 
     @property
     def weight(self) -> float:
@@ -112,28 +117,33 @@ _LINE = Shape("line", "lines", 1, 2, ((1,), (0,)), ((0, 1),))
 _TRIANGLE = Shape(
     "triangle", "triangles", 2, 3, ((1, 2), (2, 0), (0, 1)), ((0, 1, 2),), ((1, 0), (0.5, math.sqrt(0.75))),
     (((0, 1),), ((1, 2),), ((2, 0),)),
+    mirrored=(1, 0, 2),
 )  # fmt: skip
 _QUAD = Shape(
     "quadrilateral", "quadrilaterals", 2, 4, ((0, 1), (1, 2), (2, 3), (3, 0)),
     ((0, 1, 3), (1, 2, 0), (2, 3, 1), (3, 0, 2)), ((1, 0), (0, 1)),
     (((0, 1), (3, 2)), ((0, 3), (1, 2))),
+    mirrored=(1, 0, 3, 2),
 )  # fmt: skip
 _TETRA = Shape(
     "tetrahedron", "tetrahedra", 3, 4, ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)), ((0, 1, 2, 3),),
     ((1, 0, 0), (0.5, math.sqrt(0.75), 0), (0.5, math.sqrt(1 / 12), math.sqrt(2 / 3))),
     (((0, 1),), ((0, 2),), ((0, 3),), ((1, 2),), ((1, 3),), ((2, 3),)),
+    mirrored=(1, 0, 2, 3),
 )  # fmt: skip
 _PYRAMID = Shape(
     "pyramid", "pyramids", 3, 5, ((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
     ((0, 1, 3, 4), (1, 2, 0, 4), (2, 3, 1, 4), (3, 0, 2, 4)),
     ((1, 0, 0), (0, 1, 0), (0.5, 0.5, math.sqrt(0.5))),
     (((0, 1), (3, 2)), ((0, 3), (1, 2)), ((0, 4),), ((1, 4),), ((2, 4),), ((3, 4),)),
+    mirrored=(1, 0, 3, 2, 4),
 )  # fmt: skip
 _WEDGE = Shape(
     "wedge", "wedges", 3, 6, ((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)),
     ((0, 1, 2, 3), (1, 2, 0, 4), (2, 0, 1, 5), (3, 5, 4, 0), (4, 3, 5, 1), (5, 4, 3, 2)),
     ((1, 0, 0), (0.5, math.sqrt(0.75), 0), (0, 0, 1)),
     (((0, 1), (3, 4)), ((1, 2), (4, 5)), ((2, 0), (5, 3)), ((0, 3), (1, 4), (2, 5))),
+    mirrored=(1, 0, 2, 4, 3, 5),
 )  # fmt: skip
 _HEXAHEDRON = Shape(
     "hexahedron", "hexahedra", 3, 8,
@@ -144,7 +154,15 @@ _HEXAHEDRON = Shape(
     ),
     ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     (((0, 1), (3, 2), (4, 5), (7, 6)), ((0, 3), (1, 2), (4, 7), (5, 6)), ((0, 4), (1, 5), (2, 6), (3, 7))),
+    mirrored=(1, 0, 3, 2, 5, 4, 7, 6),
 )  # fmt: skip
+
+
+def _collapsed(shape: Shape) -> Shape:
+    """Of elements that name a node several times, and so have fewer corners, and are of no other type."""
+    return Shape(f"collapsed {shape.name}", f"collapsed {shape.plural}", shape.dimension, 0)
+
+
 _PIXEL = Shape("pixel", "pixels", 2, 0)  # VTK's own order of a rectangle's and a box's corners
 _VOXEL = Shape("voxel", "voxels", 3, 0)
 _STRIP = Shape("strip of triangles", "strips of triangles", 2, 0)
@@ -181,6 +199,7 @@ _TABLE = (
     Element("pixel", _PIXEL, 4, vtk=8),
     Element("voxel", _VOXEL, 8, vtk=11),
     Element("polyhedron", _POLYHEDRON, 0, vtk=42),
+    *(Element(f"collapsed_{one.name}", _collapsed(one), 0) for one in (_PYRAMID, _WEDGE, _HEXAHEDRON)),
 )
 ELEMENTS = {element.key: element for element in _TABLE}
 

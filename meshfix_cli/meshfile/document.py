@@ -18,7 +18,9 @@ from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plane import plane_basis
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
+from meshfix_cli.meshfile.splice import Turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,15 +135,14 @@ class Document:
         """Whether writing in a format keeps all but the coordinates, byte for byte."""
         return form == self.format and self.source.spliced
 
-    def reversed_cells(self) -> dict[int, NDArray[np.int64]]:
-        """Rows of the simplices, by the number of their run, whose numbering has the negative orientation."""
+    def reversed_cells(self) -> dict[int, Turned]:
+        """Return the cells, by the number of their run, whose numbering has the negative orientation."""
         element = self.mesh.topology.element
         chosen = _runs_of(self.source, element)
         starts = np.cumsum([0, *(len(self.source.cells[run].vertices) for run in chosen)])
         rows = np.flatnonzero(_reversed(_simplices(self.source, element, self.copies), self.mesh.topology))
         which = np.searchsorted(starts, rows, side="right") - 1
-        found = {run: rows[which == i] - starts[i] for i, run in enumerate(chosen)}
-        return {run: here for run, here in found.items() if len(here)}
+        return turned(self.source.cells, {run: rows[which == i] - starts[i] for i, run in enumerate(chosen)})
 
 
 def build(
@@ -201,14 +202,14 @@ def build(
     return Document(name, mesh, form, ids, fixed, left, notes, source, basis, copies)
 
 
-def with_reversed(source: Source, rows: Mapping[int, NDArray[np.int64]]) -> Source:
-    """Return a source that is to be written anew, with the first two vertices of some cells exchanged."""
-    cells = list(source.cells)
-    for run, here in rows.items():
-        vertices = cells[run].vertices.copy()
-        vertices[here, :2] = vertices[here, 1::-1]
-        cells[run] = replace(cells[run], vertices=vertices)
-    return replace(source, cells=cells, data=None)
+def with_reversed(source: Source, cells: Mapping[int, Turned]) -> Source:
+    """Return a source that is to be written anew, with some cells turned."""
+    runs = list(source.cells)
+    for run, (rows, order) in cells.items():
+        vertices = runs[run].vertices.copy()
+        vertices[rows] = vertices[rows][:, order]
+        runs[run] = replace(runs[run], vertices=vertices)
+    return replace(source, cells=runs, data=None)
 
 
 def _solved(source: Source) -> Element:

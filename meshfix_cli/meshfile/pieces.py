@@ -15,7 +15,7 @@ from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.atomic import check_target, is_stream
 from meshfix_cli.meshfile.joining import Copies, Int64, by_numbers, by_place, joined
 from meshfix_cli.meshfile.source import Arrays, Cells, Family, Source, ghost_vertices
-from meshfix_cli.meshfile.splice import Points, differing
+from meshfix_cli.meshfile.splice import Points, Turned, differing
 
 
 class _Origin(NamedTuple):
@@ -50,14 +50,12 @@ class Joined:
         """Return points (n, d) as the pieces can hold them."""
         return _filled(self.sources)[0].rounded(points)
 
-    def rewritten(
-        self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]
-    ) -> Iterator[bytes]:
-        """Give each piece with other points (n, d) of the mesh, and the first two vertices of some cells exchanged."""
-        turned: list[dict[int, Int64]] = [{} for _ in self.sources]
-        for run, rows in reversed_cells.items():
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> Iterator[bytes]:
+        """Give each piece with other points (n, d) of the mesh, and with some cells turned."""
+        turned: list[dict[int, Turned]] = [{} for _ in self.sources]
+        for run, cells in reversed_cells.items():
             origin = self.origins[run]
-            turned[origin.piece][origin.run] = origin.rows[rows]
+            turned[origin.piece][origin.run] = cells._replace(rows=origin.rows[cells.rows])
         if reversed_cells and any(run.ghosts is not None for source in self.sources for run in source.cells):
             raise ReadError("has ghost cells, of which the copies would keep their numbering")
         changed = differing(original, points)

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, naming
 from meshfix_cli.kernels import use_threads
@@ -23,6 +22,7 @@ from meshfix_cli.meshfile.document import Document, build, with_reversed
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.pieces import join
 from meshfix_cli.meshfile.source import Family, Source
+from meshfix_cli.meshfile.splice import Turned
 
 
 def read(
@@ -73,11 +73,11 @@ def read(
     with naming(name):
         source, found = _open(None if streamed else Path(name), double, form, threads)
         document = built(source, found)
-        rows = document.reversed_cells() if fix_orientation else {}
-        if rows:
-            shape = document.mesh.topology.element.shape
-            note = f"renumbered {counted(sum(map(len, rows.values())), shape.name, shape.plural)}"
-            document = built(_with_reversed(document.source, rows, found, threads), found)
+        cells = document.reversed_cells() if fix_orientation else {}
+        if cells:
+            shape, number = document.mesh.topology.element.shape, sum(len(turned.rows) for turned in cells.values())
+            note = f"renumbered {counted(number, shape.name, shape.plural)}"
+            document = built(_with_reversed(document.source, cells, found, threads), found)
             document = replace(document, notes=(*document.notes, note))
         return document
 
@@ -199,10 +199,10 @@ def _promoted(data: bytes, form: Format) -> Source:
     return parse(_module(form).promoted(data), form)
 
 
-def _with_reversed(source: Source, rows: dict[int, NDArray[np.int64]], form: Format, threads: int) -> Source:
+def _with_reversed(source: Source, cells: dict[int, Turned], form: Format, threads: int) -> Source:
     if source.pieces is not None:
         family = source.pieces.family
-        return join(family, family.parse(list(source.pieces.rewritten(source.points, source.points, rows))), threads)
+        return join(family, family.parse(list(source.pieces.rewritten(source.points, source.points, cells))), threads)
     if source.layout is not None:
-        return parse(source.layout.rewritten(source.points, source.points, rows), form)
-    return with_reversed(source, rows)
+        return parse(source.layout.rewritten(source.points, source.points, cells), form)
+    return with_reversed(source, cells)

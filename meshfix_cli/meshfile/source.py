@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.meshfile.formats import Format
-from meshfix_cli.meshfile.splice import InPlace, Points
+from meshfix_cli.meshfile.splice import InPlace, Points, Turned
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
 REGIONS = (
@@ -93,8 +93,8 @@ class Layout(Protocol):
     def rounded(self, points: Points) -> Points:
         """Return points (n, d) as the file can hold them."""
 
-    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
-        """Return the file with other points (n, d), and with the first two vertices of some cells exchanged."""
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> bytes:
+        """Return the file with other points (n, d), and with some cells turned."""
 
 
 class Family(Protocol):
@@ -143,10 +143,8 @@ class Pieces(Protocol):
     def rounded(self, points: Points) -> Points:
         """Return points (n, d) as the pieces can hold them."""
 
-    def rewritten(
-        self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]
-    ) -> Iterable[bytes]:
-        """Give each piece with other points (n, d) of the mesh, and the first two vertices of some cells exchanged."""
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> Iterable[bytes]:
+        """Give each piece with other points (n, d) of the mesh, and with some cells turned."""
 
     def files(self, target: str, original: Points, points: Points) -> Iterator[tuple[str, bytes]]:
         """Give names and contents of all files of an output, what names the pieces last."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,27 @@ from meshfix_cli.meshfile.text import Spans, numbers_at
 
 Points = NDArray[np.floating[Any]]
 SLAB = 65536  # points whose coordinates are written at once
+
+
+class Turned(NamedTuple):
+    """Cells of a run that get the other orientation.
+
+    Attributes
+    ----------
+    rows : (k,) int64
+    order : sequence of int
+        Which of its vertices stands in each place of a cell afterwards.
+    """
+
+    rows: NDArray[np.int64]
+    order: Sequence[int]
+
+    @property
+    def places(self) -> NDArray[np.int64]:
+        """(2, c) int64: the places in which another vertex will stand, and where each of these stands now."""
+        order = np.array(self.order, dtype=np.int64)
+        changed = np.flatnonzero(order != np.arange(len(order)))
+        return np.stack([changed, order[changed]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,12 +126,16 @@ class Places:
         """Write numbers (n, k) where `which` (n, k) is True."""
         return Edits(self.at(which).spans, *self._encode(values[which]))
 
-    def exchange(self, data: bytes, rows: NDArray[np.integer[Any]]) -> Edits:
-        """Exchange the first two numbers of some rows."""
-        spans = self.spans[rows, :2]
-        words = [data[first:last] for first, last in spans[:, ::-1].reshape(-1, 2).tolist()]
+    def turn(self, data: bytes, cells: Turned) -> Edits:
+        """Put the numbers of some rows into another order."""
+        there, here = cells.places
+        return self.at((cells.rows[:, None], there)).copied(data, self.at((cells.rows[:, None], here)))
+
+    def copied(self, data: bytes, others: Places) -> Edits:
+        """Write the numbers that stand in as many other places, as they are."""
+        words = [data[first:last] for first, last in others.spans.reshape(-1, 2).tolist()]
         ends = np.cumsum([0, *map(len, words)])
-        return Edits(np.ascontiguousarray(spans.reshape(-1, 2)), b"".join(words), pairs(ends))
+        return Edits(np.ascontiguousarray(self.spans.reshape(-1, 2)), b"".join(words), pairs(ends))
 
     def _encode(self, values: Points) -> tuple[bytes, Spans]:
         if self.end is None:
@@ -144,19 +169,19 @@ class InPlace:
         """Return points (n, d) as the file can hold them."""
         return self.coordinates.rounded(points)
 
-    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
-        """Return the file with other points (n, d), and with the first two vertices of some cells exchanged.
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> bytes:
+        """Return the file with other points (n, d), and with some cells turned.
 
         Parameters
         ----------
         original : (n, d) float
             The points as they were read.
         reversed_cells : mapping
-            Rows of cells by the number of their run.
+            Cells by the number of their run.
         """
         changed = self._changes(original, points, slice(None))
-        swaps = (self.corners[run]().exchange(self.data, rows) for run, rows in reversed_cells.items())
-        return apply(self.data, [changed, *swaps])
+        turned = (self.corners[run]().turn(self.data, cells) for run, cells in reversed_cells.items())
+        return apply(self.data, [changed, *turned])
 
     def moved(self, original: Points, points: Points) -> Iterable[bytes | memoryview]:
         """Give the file with other points (n, d) in parts: never is much of it in memory once more."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
-from meshfix_cli.meshfile.splice import Edits, Places, Points, apply, differing
+from meshfix_cli.meshfile.splice import Edits, Places, Points, Turned, apply, differing
 from meshfix_cli.meshfile.text import Spans, first_words, in_line, line_words
 
 _SOLID = re.compile(rb"(?:\xef\xbb\xbf)?\s*solid\b", re.IGNORECASE)
@@ -50,11 +50,11 @@ class _Facets:
         """Return points (n, 3) as the file can hold them."""
         return self.corners.rounded(points)
 
-    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> bytes:
         """Return the file with other points (n, 3) and turned facets, and with the normals of all that changed."""
         rows, turned = self.rows.copy(), np.zeros(len(self.rows), dtype=bool)
-        for here in reversed_cells.values():
-            rows[here, :2], turned[here] = rows[here, 1::-1], True
+        for here, order in reversed_cells.values():
+            rows[here], turned[here] = rows[here][:, order], True
         changed = differing(original, points)[rows]
         moved = changed.any(axis=(1, 2))
         changed[turned & moved, :2] = True
@@ -63,10 +63,9 @@ class _Facets:
         return apply(self.data, [corners, self._exchanged(turned & ~moved), normals])
 
     def _exchanged(self, facets: NDArray[np.bool_]) -> Edits:
-        """Exchange the first two corners of some facets, number by number."""
-        first = np.repeat(3 * np.flatnonzero(facets), 3)[:, None]
-        places = self.corners.at((first + np.arange(2), np.arange(len(first))[:, None] % 3))
-        return places.exchange(self.data, np.arange(len(first)))
+        """Exchange the first two corners of some facets."""
+        here, there = (3 * np.flatnonzero(facets)[:, None] + place for place in ([0, 1], [1, 0]))
+        return self.corners.at(here).copied(self.data, self.corners.at(there))
 
     def _renewed(self, facets: NDArray[np.bool_], corners: Points) -> Edits:
         """Make the normals of some facets those of their corners (k, 3, 3)."""

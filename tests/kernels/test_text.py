@@ -10,7 +10,7 @@ import pytest
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.splice import Edits, Places, apply
+from meshfix_cli.meshfile.splice import Edits, Places, Turned, apply
 from meshfix_cli.meshfile.text import integers, integers_at, line_words, numbers_at, words
 
 DOUBLE, SINGLE = np.dtype("f8"), np.dtype("f4")
@@ -125,14 +125,14 @@ def test_edits_in_any_order_change_nothing_else() -> None:
         apply(data, [early, early])
 
 
-def test_the_first_two_corners_change_places() -> None:
+def test_corners_change_places() -> None:
     data = b"3 10/1 2 30\n3 4 5 6"
     places = Places.of_text(line_words(data, [2, 14], 3), "i8")
-    assert apply(data, [places.exchange(data, np.array([0]))]) == b"3 2 10/1 30\n3 4 5 6"
+    assert apply(data, [places.turn(data, Turned(np.array([0]), (1, 0, 2)))]) == b"3 2 10/1 30\n3 4 5 6"
     rows = np.arange(6, dtype=">i4").tobytes()
     binary = Places.of_rows(np.array([0, 12]), 3, ">i4")
-    after = np.frombuffer(apply(rows, [binary.exchange(rows, np.array([1]))]), dtype=">i4")
-    assert after.tolist() == [0, 1, 2, 4, 3, 5]
+    after = np.frombuffer(apply(rows, [binary.turn(rows, Turned(np.array([1]), (0, 2, 1)))]), dtype=">i4")
+    assert after.tolist() == [0, 1, 2, 3, 5, 4]
 
 
 @pytest.fixture(params=[1, 2, 3])

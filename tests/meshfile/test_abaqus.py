@@ -13,6 +13,7 @@ from shapes import block, plate
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import dimension_of
 from meshfix_cli.meshfile.abaqus import parse
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 NODES = b"*NODE\n1, 0., 0.\n2, 1., 0.\n3, 1., 1.\n4, 0., 1.\n50, .5, .25\n"
@@ -129,7 +130,7 @@ def test_reversed_cells_read_back(name: str, tmp_path: Path) -> None:
     )
     rows = np.array([0, 3, 7])
     assert source.layout is not None
-    back = parsed(source.layout.rewritten(source.points, source.points, {run: rows}))
+    back = parsed(source.layout.rewritten(source.points, source.points, turned(source.cells, {run: rows})))
     expected = source.cells[run].vertices.copy()
     expected[rows, :2] = expected[rows, 1::-1]
     np.testing.assert_array_equal(back.cells[run].vertices, expected)
@@ -258,7 +259,7 @@ def test_elements_whose_faces_are_named_are_not_renumbered() -> None:
     source = parsed(SMALL + b"*SURFACE, TYPE=ELEMENT, NAME=Load\n1, S2\n")
     assert source.layout is not None
     with pytest.raises(ReadError, match="names faces of elements"):
-        source.layout.rewritten(source.points, source.points, {0: np.array([0])})
+        source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([0])}))
 
 
 def test_files_may_be_included_by_steps() -> None:

@@ -17,6 +17,7 @@ from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import gmsh
 from meshfix_cli.meshfile.gmsh.cells import TYPES
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 SQUARE = "1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 .5 .5 0\n"
@@ -310,7 +311,7 @@ def test_corners_are_exchanged_in_the_file(variant: str, tmp_path: Path) -> None
     source = of_variant(variant, tmp_path)
     assert source.layout is not None
     chosen = {i: np.array([0, 3]) for i, run in enumerate(source.cells) if run.type in ("triangle", "tetra")}
-    data = source.layout.rewritten(source.points, source.points, chosen)
+    data = source.layout.rewritten(source.points, source.points, turned(source.cells, chosen))
     expected = [run.vertices.copy() for run in source.cells]
     for run, rows in chosen.items():
         expected[run][rows, :2] = expected[run][rows, 1::-1]

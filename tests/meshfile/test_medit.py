@@ -11,6 +11,7 @@ from shapes import block, plate
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.medit import parse, promoted
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 SMALL = (
@@ -135,7 +136,7 @@ def test_reversed_cells_read_back(name: str, tmp_path: Path) -> None:
     kind = "tetra" if any(run.type == "tetra" for run in source.cells) else "triangle"
     run, rows = _index(source, kind), np.array([0, 3, 7])
     assert source.layout is not None
-    back = parsed(source.layout.rewritten(source.points, source.points, {run: rows}))
+    back = parsed(source.layout.rewritten(source.points, source.points, turned(source.cells, {run: rows})))
     expected = source.cells[run].vertices.copy()
     expected[rows, :2] = expected[rows, 1::-1]
     np.testing.assert_array_equal(back.cells[run].vertices, expected)

@@ -12,6 +12,7 @@ import pytest
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import obj
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 VERTICES = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
@@ -95,7 +96,7 @@ def test_only_the_words_of_moved_coordinates_change() -> None:
 def test_reversed_faces_take_textures_and_normals_with_them() -> None:
     source = parse(VERTICES + b"f 1/10/7  2/20/8 3/30/9\nf -1 -2 -3\nf 1//1 3//1 4//1 # b\n")
     assert source.layout is not None
-    after = source.layout.rewritten(source.points, source.points, {0: np.array([0, 2])})
+    after = source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([0, 2])}))
     assert after == VERTICES + b"f 2/20/8  1/10/7 3/30/9\nf -1 -2 -3\nf 3//1 1//1 4//1 # b\n"
     assert cells(after) == {"triangle": [[1, 0, 2], [3, 2, 1], [2, 0, 3]]}
 
@@ -146,8 +147,8 @@ def test_lines_may_be_continued_and_comments_not(end: bytes) -> None:
     source = parse(data)
     assert source.layout is not None
     assert source.layout.rewritten(source.points, source.points, {}) == data
-    turned = source.layout.rewritten(source.points, source.points, {0: np.array([0])})
-    assert turned == data.replace(b"f 1 2", b"f 2 1")
+    file = source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([0])}))
+    assert file == data.replace(b"f 1 2", b"f 2 1")
 
 
 def test_materials_are_regions() -> None:

@@ -13,6 +13,7 @@ import pytest
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import ply
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 HEAD = (
@@ -70,8 +71,8 @@ def test_types_of_lists(order: str, length: str, index: str, tmp_path: Path) -> 
     source = parse(data)
     assert source.cells[0].vertices.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert source.layout is not None
-    turned = parse(source.layout.rewritten(source.points, source.points, {0: np.array([1])}))
-    assert turned.cells[0].vertices.tolist() == [[0, 1, 2], [2, 0, 3]]
+    after = parse(source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([1])})))
+    assert after.cells[0].vertices.tolist() == [[0, 1, 2], [2, 0, 3]]
 
 
 @pytest.mark.parametrize("order", ["", "<", ">"])
@@ -145,7 +146,7 @@ def test_only_the_words_of_moved_coordinates_change() -> None:
     points = source.points.copy()
     points[2, 1] = 0.1
     assert source.layout is not None
-    after = source.layout.rewritten(source.points, points, {0: np.array([1])})
+    after = source.layout.rewritten(source.points, points, turned(source.cells, {0: np.array([1])}))
     assert after == TEXT.replace(b"1.50", b"0.1").replace(b"3 0 2 3", b"3 2 0 3")
 
 

@@ -11,6 +11,7 @@ import pytest
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import stl
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 FACETS = [
@@ -28,10 +29,10 @@ def parse(data: bytes) -> Source:
     return source
 
 
-def rewritten(data: bytes, points: np.ndarray, turned: list[int]) -> bytes:
+def rewritten(data: bytes, points: np.ndarray, facets: list[int]) -> bytes:
     source = parse(data)
     assert source.layout is not None
-    return source.layout.rewritten(source.points, points, {0: np.array(turned)} if turned else {})
+    return source.layout.rewritten(source.points, points, turned(source.cells, {0: np.array(facets)} if facets else {}))
 
 
 def binary(corners: np.ndarray, head: bytes = b"") -> bytes:

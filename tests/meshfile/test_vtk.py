@@ -17,6 +17,7 @@ from places import SAMPLES
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import dimension_of
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 from meshfix_cli.meshfile.vtk import legacy as vtk
 
@@ -141,7 +142,7 @@ def test_reversed_cells_are_read_back(name: str, tmp_path: Path) -> None:
     assert source.layout is not None
     runs = [i for i, run in enumerate(source.cells) if run.type in ("triangle", "tetra") and len(run.vertices) > 2]
     rows = {runs[0]: np.array([2, 0]), runs[-1]: np.array([1])}
-    result = source.layout.rewritten(source.points, source.points, rows)
+    result = source.layout.rewritten(source.points, source.points, turned(source.cells, rows))
     _, others = read_independently(tmp_path / name)
     _, others_after = by_vtk(result, tmp_path)
     expected, found = cells_of(others), cells_of(others_after)
@@ -214,7 +215,7 @@ def test_types_that_alternate(extra: str) -> None:
     assert (np.asarray(triangles.ids) % 2 == 0).all()
     assert (triangles.vertices == [0, 1, 4]).all()
     assert source.layout is not None
-    result = source.layout.rewritten(source.points, source.points, {i: np.array([1])})
+    result = source.layout.rewritten(source.points, source.points, turned(source.cells, {i: np.array([1])}))
     assert result == data.replace(b"3 0 1 4 4 0 1 2 3 3 0 1 4", b"3 0 1 4 4 0 1 2 3 3 1 0 4", 1)
 
 

@@ -19,6 +19,7 @@ from shapes import block
 
 from meshfix_cli import read
 from meshfix_cli.errors import InvalidMeshError, MeshfixError, ReadError
+from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 from meshfix_cli.meshfile.vtk import vtu
 from meshfix_cli.meshfile.vtk.arrays import COMPRESSORS
@@ -107,7 +108,9 @@ def test_reversed_cells_have_their_first_two_vertices_exchanged(variant: str, tm
     ids = source.cells[run].ids
     assert ids is not None
     rows = np.array([2, len(ids) - 1])
-    after, others_after = read_by_vtk(source.layout.rewritten(source.points, source.points, {run: rows}), tmp_path)
+    after, others_after = read_by_vtk(
+        source.layout.rewritten(source.points, source.points, turned(source.cells, {run: rows})), tmp_path
+    )
     for first in others["offsets"][ids[rows]]:
         others["connectivity"][[first, first + 1]] = others["connectivity"][[first + 1, first]]
     np.testing.assert_array_equal(after, points)

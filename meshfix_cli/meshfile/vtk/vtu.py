@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Source, ghost_vertices
-from meshfix_cli.meshfile.splice import Points, differing
+from meshfix_cli.meshfile.splice import Points, Turned, differing
 from meshfix_cli.meshfile.vtk.arrays import Payload
 from meshfix_cli.meshfile.vtk.cells import Run, markings, runs
 from meshfix_cli.meshfile.vtk.xml import Element, XmlFile
@@ -131,8 +131,8 @@ class _Layout:
         """Return points (n, 3) as the file can hold them."""
         return points.astype(self.dtype)
 
-    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, NDArray[np.int64]]) -> bytes:
-        """Return the file with other points (n, 3), and with the first two vertices of some cells exchanged."""
+    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> bytes:
+        """Return the file with other points (n, 3), and with some cells turned."""
         which, values = differing(original, points).reshape(-1, 1), points.reshape(-1, 1)
         edits = []
         for share in self.points:
@@ -141,15 +141,22 @@ class _Layout:
                 numbers = self.file.numbers(share.array, share.size)
                 places = numbers.places(np.arange(share.size)[:, None])
                 edits.append(numbers.edited(places.replace(which[here], values[here])))
-        none = np.empty(0, dtype=np.int64)
-        first = np.concatenate([none, *(self.starts[run][rows] for run, rows in reversed_cells.items())])
+        there, here = self._turned(reversed_cells)
         for share in self.connectivity:
-            rows = first[(first >= share.first) & (first < share.first + share.size)] - share.first
-            if len(rows):
+            which = (there >= share.first) & (there < share.first + share.size)
+            if which.any():
                 numbers = self.file.numbers(share.array, share.size)
-                places = numbers.places(rows[:, None] + np.arange(2))
-                edits.append(numbers.edited(places.exchange(numbers.body, np.arange(len(rows)))))
+                new, old = (numbers.places((at[which] - share.first)[:, None]) for at in (there, here))
+                edits.append(numbers.edited(new.copied(numbers.body, old)))
         return self.file.edited(edits)
+
+    def _turned(self, reversed_cells: Mapping[int, Turned]) -> NDArray[np.int64]:
+        """(2, k) int64: where in the connectivity another vertex will stand, and where each of these stands now."""
+        parts = [
+            (self.starts[run][cells.rows][:, None] + cells.places[:, None]).reshape(2, -1)
+            for run, cells in reversed_cells.items()
+        ]
+        return np.concatenate([np.empty((2, 0), dtype=np.int64), *parts], axis=1)
 
 
 def _pieces(file: XmlFile) -> list[_Piece]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -166,10 +165,11 @@ def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.in
     source: NDArray[np.int32] = np.arange(len(codes), dtype=np.int32)
     mesh = kernels.Connectivity(points, codes, nodes, used, threads)
     if mesh.crowded >= 0:
-        kept = [_first_of_each(rows) for _, rows in blocks]
-        starts = np.cumsum([0, *(len(rows) for _, rows in blocks[:-1])])
-        source = np.concatenate([start + rows for start, rows in zip(starts, kept, strict=True)]).astype(np.int32)
-        nodes = np.concatenate([rows[first].ravel() for (_, rows), first in zip(blocks, kept, strict=True)])
+        source = _first_of_each(blocks)
+        sizes = np.array([one.nodes for one in JUDGED])[codes]
+        kept = np.zeros(len(codes), dtype=bool)
+        kept[source] = True
+        nodes = nodes[np.repeat(kept, sizes)]
         codes = codes[source]
         mesh = kernels.Connectivity(points, codes, nodes, used, threads)
     if mesh.crowded >= 0:
@@ -183,8 +183,16 @@ def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.in
     return MixedTopology(len(points), source, rows, mesh)
 
 
-def _first_of_each(rows: NDArray[np.int32]) -> NDArray[Any]:
-    return np.sort(np.unique(np.sort(rows, axis=1), axis=0, return_index=True)[1])
+def _first_of_each(blocks: Blocks) -> NDArray[np.int32]:
+    """Return the elements (m,), ascending, that repeat none before them; several blocks may have one type."""
+    starts = np.cumsum([0, *(len(rows) for _, rows in blocks)])
+    kept = []
+    for element in dict.fromkeys(element for element, _ in blocks):
+        mine = [i for i, (other, _) in enumerate(blocks) if other is element]
+        numbers = np.concatenate([np.arange(starts[i], starts[i + 1]) for i in mine])
+        ordered = np.sort(np.concatenate([blocks[i][1] for i in mine]), axis=1)
+        kept.append(numbers[np.unique(ordered, axis=0, return_index=True)[1]])
+    return np.sort(np.concatenate(kept)).astype(np.int32)
 
 
 def _facet_of(mesh: kernels.Connectivity, facet: int) -> list[int]:

@@ -201,3 +201,13 @@ def test_one_mesh_may_be_used_by_several_threads() -> None:
 def test_mean_edge_length_is_that_of_the_distinct_edges() -> None:
     mesh = Mesh.build(SQUARE[:4], [[0, 1, 2], [0, 2, 3]])
     assert mesh.mean_edge_length() == pytest.approx((4 + np.sqrt(2)) / 5)
+
+
+def test_repetitions_are_found_in_all_blocks_of_a_type() -> None:
+    points = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [1, 1], [0, 1]], dtype=float)
+    quad, triangles = [[0, 1, 4, 5]], [[1, 2, 3], [1, 3, 4]]
+    mesh = Mesh.build(
+        points, [("quad", quad), ("triangle", triangles), ("quad", [[4, 5, 0, 1]]), ("triangle", triangles)]
+    )
+    assert mesh.topology.source.tolist() == [0, 1, 2]
+    assert [block.vertices.tolist() for block in mesh.topology.blocks] == [triangles, quad]

@@ -26,6 +26,7 @@ class Format:
         return {"gmsh22": "gmsh", "vtk42": "vtk"}.get(self.name, self.name)
 
 
+DRAWINGS = ("obj", "off", "ply", "stl")  # these have no plane meshes, and their faces need not be elements
 PARTS = Format("gmsh parts")  # several files of gmsh
 
 

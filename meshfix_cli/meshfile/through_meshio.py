@@ -19,10 +19,11 @@ from meshio.mdpa._mdpa import _mdpa_to_meshio_type
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
-from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, solved_among
+from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES
 from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plainly import plainly
+from meshfix_cli.meshfile.solved import solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
@@ -32,8 +33,10 @@ BLOCK = "exodus:block"
 _OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
+# Of the elements of one shape meshio names a rigid one, one with the pressure of pores, and a hybrid one.
+_PLAIN = {b"R3D3": b"CPS3", b"CAX4P": b"CPS4", b"C3D8RH": b"C3D8"}
+_TURNED = ("vtk", "vtu")
 _WITH_SETS = ("abaqus", "exodus")
-_SPATIAL = ("obj", "off", "ply", "stl")  # these have no plane meshes
 
 
 def read(data: bytes, form: Format, path: Path | None = None) -> Source:
@@ -56,10 +59,9 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
 
 def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
     """Write as much of a source, with other points (n, d), as the format takes; WriteError where that is nothing."""
-    element = solved_among(run.type for run in source.cells)
-    solved = {element.key} if element else set()
+    solved = {source.cells[i].type for i in solved_runs(source.cells)}
     attempts = [(_KNOWN, source.arrays), (_COMMON, source.arrays), (solved, source.arrays), (solved, Arrays())]
-    if form.name in _SPATIAL and points.shape[1] == 2:
+    if form.name in formats.DRAWINGS and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     for types, arrays in attempts:
         kept = [i for i, run in enumerate(source.cells) if run.type in types and len(run.vertices)]
@@ -73,8 +75,9 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
         raise last
     if len(list(path.parent.iterdir())) > 1:
         raise WriteError(f"cannot be written as {form.name}: it takes more than one file")
-    if form.name == "abaqus":  # meshio's name of triangles is that of rigid elements
-        path.write_bytes(path.read_bytes().replace(b"TYPE=R3D3\n", b"TYPE=CPS3\n"))
+    if form.name == "abaqus":
+        names = rb"(?<=TYPE=)\w+(?=\n)"
+        path.write_bytes(re.sub(names, lambda name: _PLAIN.get(name[0], name[0]), path.read_bytes()))
 
 
 def _unknown_elements(data: bytes) -> str | None:
@@ -120,7 +123,7 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
     sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(
         points,
-        [(source.cells[i].type, source.cells[i].vertices) for i in kept],
+        [(source.cells[i].type, _in_order_of(form, source.cells[i])) for i in kept],
         point_data={name(key): values("", array) for key, array in arrays.point.items()},
         cell_data={key: [values(key, array) for array in runs] for key, runs in cell.items()},
         # The numbers of sets of groups are not those of the groups.
@@ -128,6 +131,11 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
         point_sets=dict(arrays.point_sets) if form.name in _WITH_SETS else {},
         cell_sets={key: [runs[i] for i in kept] for key, runs in sets.items()},
     )
+
+
+def _in_order_of(form: Format, run: Cells) -> Any:
+    """Return the vertices of cells so that meshio, which still turns wedges for VTK, writes them as they are."""
+    return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices
 
 
 def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, list[NDArray[np.int64]]]:
@@ -193,7 +201,7 @@ def _numbered(cells: list[Cells], numbers: dict[str, NDArray[np.int64]]) -> list
 def _arbitrary(form: Format, cells: list[Cells]) -> bool:
     """Whether cells are numbered with no regard to their orientation: dolfin's are, with ascending vertices."""
     simplices = [run.vertices for run in cells if run.type in (one.key for one in SIMPLICES.values())]
-    ascending = all((np.diff(vertices, axis=1) > 0).all() for vertices in simplices)
+    ascending = len(simplices) > 0 and all((np.diff(vertices, axis=1) > 0).all() for vertices in simplices)
     return form.name == "dolfin-xml" or (form.name == "xdmf" and ascending)
 
 

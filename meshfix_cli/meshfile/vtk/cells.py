@@ -26,7 +26,6 @@ TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() 
     78: ("VTK_BEZIER_TETRAHEDRON", 0), 79: ("VTK_BEZIER_HEXAHEDRON", 0), 80: ("VTK_BEZIER_WEDGE", 0),
     81: ("VTK_BEZIER_PYRAMID", 0),
 }  # fmt: skip
-_ORDER = {13: [0, 2, 1, 3, 5, 4]}  # the wedge of meshio, from that of VTK, and back
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 _MOST_RUNS = 1000  # above, cells of a type are gathered from all over the file
 
@@ -40,7 +39,7 @@ class Run(NamedTuple):
     rows : (k,) int64
         Which cells of the file they are.
     vertices : (k, size) int
-        In meshio's order.
+        In the order of VTK.
     """
 
     type: str
@@ -78,15 +77,15 @@ def runs(
     for rows in _same(types, sizes):
         number, size = int(types[rows[0]]), int(sizes[rows[0]])
         name, expected = TYPES.get(number, (f"vtk{number}", 0))
-        if name == "polygon" and size == 3:
-            name = "triangle"
+        if name == "polygon":
+            name = {3: "triangle", 4: "quad"}.get(size, name)
         if expected not in (0, size):
             corners = counted(size, "vertex", "vertices")
             raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {corners}")
-        if number not in _ORDER and rows[-1] - rows[0] == len(rows) - 1:  # they stand one behind the other
+        if rows[-1] - rows[0] == len(rows) - 1:  # they stand one behind the other
             vertices = connectivity[offsets[rows[0]] : offsets[rows[-1] + 1]].reshape(len(rows), size)
         else:
-            vertices = connectivity[offsets[rows][:, None] + np.array(_ORDER.get(number, range(size)), dtype=np.int64)]
+            vertices = connectivity[offsets[rows][:, None] + np.arange(size)]
         found.append(Run(name, rows, vertices))
     return found
 

@@ -84,7 +84,7 @@ def main() -> None:
             reading = time.perf_counter() - start
             moved, _ = perturb(document.mesh, 100, 0.01 * document.mesh.mean_edge_length())
             write(document, moved, path)
-            check(original, path, document.file_points(moved), document.simplices)
+            check(original, path, document.file_points(moved), document.parts[0].vertices)
             ours, theirs = [], []
             for _ in range(options.repeats):
                 ours.append(seconds(lambda: write(document, moved, path)))  # noqa: B023

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 Rows = tuple[tuple[int, ...], ...]
@@ -226,13 +225,6 @@ def dimension_of(key: str) -> int:
         return ELEMENTS[key].shape.dimension
     name = re.sub("^vtk_[a-z]+_", "", key.lower())
     return next((dimension for dimension, names in _FAMILIES.items() if name.startswith(names)), 0)
-
-
-def solved_among(keys: Iterable[str]) -> Element | None:
-    """Return the type that is solved for of those in a mesh, that of the highest dimension; None: there is none."""
-    found = set(keys)
-    present = [element for element in SIMPLICES.values() if element.key in found]
-    return max(present, key=lambda element: element.shape.dimension, default=None)
 
 
 def words(key: str) -> tuple[str, str]:

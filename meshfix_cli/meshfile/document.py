@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError
-from meshfix_cli.mesh.elements import Element, counted, dimension_of, solved_among
+from meshfix_cli.mesh.elements import counted, dimension_of
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
-from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.formats import DRAWINGS, Format
 from meshfix_cli.meshfile.plane import plane_basis
-from meshfix_cli.meshfile.solved import turned
+from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 
@@ -34,8 +34,8 @@ class Document:
     mesh : Mesh
     format : Format
     ids : (m,) int64
-        For each simplex of the mesh the number that the file gives to it, or, where it gives none, its position
-        among all cells of the file, from 0.
+        For each element of the mesh the number that the file gives to its cell, or, where it gives none, the position
+        of this among all cells of the file, from 0.
     fixed : dict
         Number of vertices held for each reason; a vertex counts for the first that applies.
     not_judged : dict
@@ -43,6 +43,8 @@ class Document:
     notes : tuple of str
         What a user should know about the file, a sentence each.
     source : Source
+    solved : Solved
+        Which cells of the file the elements are, repetitions included.
     basis : (2, 3) float64 or None
         Spans the plane of a planar mesh in space.
     copies : (n,) int64 or None
@@ -57,6 +59,7 @@ class Document:
     not_judged: dict[str, int]
     notes: tuple[str, ...]
     source: Source = field(repr=False)
+    solved: Solved = field(repr=False)
     basis: NDArray[np.float64] | None
     copies: NDArray[np.int64] | None = None
 
@@ -67,10 +70,9 @@ class Document:
         return (self.name, *(map(str, pieces.family.paths) if pieces else ()))
 
     @property
-    def simplices(self) -> NDArray[np.int64]:
-        """(m, d+1) int64: the simplices of the mesh as the file numbers their vertices."""
-        element = self.mesh.topology.element
-        return self.source.vertices_of(element.key, element.nodes)[self.mesh.topology.source]
+    def parts(self) -> tuple[Part, ...]:
+        """The elements of the mesh, without repetitions, with their vertices as the file numbers them."""
+        return self.solved.some(self.mesh.topology.source)
 
     def outputs(self, target: str, form: Format) -> tuple[str, ...]:
         """Return the names of the files that an output in a format has; WriteError where it cannot be."""
@@ -136,13 +138,18 @@ class Document:
         return form == self.format and self.source.spliced
 
     def reversed_cells(self) -> dict[int, Turned]:
-        """Return the cells, by the number of their run, whose numbering has the negative orientation."""
-        element = self.mesh.topology.element
-        chosen = _runs_of(self.source, element)
-        starts = np.cumsum([0, *(len(self.source.cells[run].vertices) for run in chosen)])
-        rows = np.flatnonzero(_reversed(_simplices(self.source, element, self.copies), self.mesh.topology))
-        which = np.searchsorted(starts, rows, side="right") - 1
-        return turned(self.source.cells, {run: rows[which == i] - starts[i] for i, run in enumerate(chosen)})
+        """Return the cells, by the number of their run, whose numbering has the negative orientation.
+
+        Raises
+        ------
+        ReadError
+            They are strips of triangles, in which no triangle can be renumbered alone.
+        """
+        rows: dict[int, NDArray[np.int64]] = {}
+        for part in self.solved.some(np.flatnonzero(_reversed(self.solved, self.mesh.topology))):
+            here = np.arange(len(part.vertices)) if part.rows is None else part.rows
+            rows[part.run] = np.concatenate([rows.get(part.run, here[:0]), here])
+        return turned(self.source.cells, rows)
 
 
 def build(
@@ -155,37 +162,31 @@ def build(
     threads: int = 1,
 ) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
-    element = _solved(source)
-    dimension = element.shape.dimension
+    solved = _solved(source)
     if regions is not None:
         source = _with_regions(source, regions)
-    starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)])
-    chosen = _runs_of(source, element)
-    simplices = _simplices(source, element)
-    parts = [_ids(source.cells[i], int(starts[i])) for i in chosen]
-    ids = parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-    points, basis = _solved_points(source, simplices, dimension)
-    copies = _copies(points, simplices) if join_points else None
-    simplices = simplices if copies is None else copies[simplices]
-    held = {"on other cells of the file": _on_other_cells(source, chosen, len(points))}
+    points, basis = _solved_points(source, solved)
+    copies = _copies(points, solved) if join_points else None
+    if copies is not None:
+        solved = solved_of([_joined(run, copies) for run in source.cells])
+    held = {"on other cells of the file": _on_other_cells(solved, len(points))}
     if source.held is not None:
         held["by the file"] = source.held
     if fix is not None:
         held[f"by --fix {fix}"] = _fixed_by(source, fix)
-    mesh = replace(Mesh.build(points, simplices, threads=threads), apart=source.apart)
+    mesh = replace(Mesh.build(points, solved.blocks, threads=threads), apart=source.apart)
     if not source.oriented:  # the numbering says nothing
         mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
     topology = mesh.topology
     reasons = {"on the boundary": topology.boundary}
     for key in source.regions:
-        labels = np.concatenate([source.arrays.cell[key][i] for i in chosen])
+        labels = solved.of_elements(source.arrays.cell[key])
         if key not in REGIONS and key != regions and not _are_labels(labels):
             continue
         if labels.ndim != 1:
             components = counted(labels.shape[1], "component", "components")
             raise ReadError(f"the cell data {key!r} are not labels of regions: they have {components}")
-        reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, simplices, topology))
+        reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, solved, topology))
     fixed = {}
     if copies is not None:
         held = {reason: _of_copies(mask, copies) for reason, mask in held.items()}
@@ -195,11 +196,11 @@ def build(
         mesh = mesh.with_fixed(mask)
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
     seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
-    notes = (*source.notes, *_notes(mesh, len(simplices), seen_from_above, copies))
+    notes = (*source.notes, *_notes(mesh, solved, seen_from_above, copies), *_concave(mesh, form))
     fixed = {reason: count for reason, count in fixed.items() if count}
-    left = _not_judged(source, element)
+    ids = solved.of_elements(_ids(source))
     ids = ids if topology.m == len(ids) else ids[topology.source]
-    return Document(name, mesh, form, ids, fixed, left, notes, source, basis, copies)
+    return Document(name, mesh, form, ids, fixed, solved.not_judged(), notes, source, solved, basis, copies)
 
 
 def with_reversed(source: Source, cells: Mapping[int, Turned]) -> Source:
@@ -212,19 +213,20 @@ def with_reversed(source: Source, cells: Mapping[int, Turned]) -> Source:
     return replace(source, cells=runs, data=None)
 
 
-def _solved(source: Source) -> Element:
-    """Return the type that is solved for: no cell may be of a higher dimension."""
+def _solved(source: Source) -> Solved:
+    """Return what is solved for: no cell may be of a higher dimension."""
+    solved = solved_of(source.cells)
+    if solved.parts:
+        return solved
     types = {run.type for run in source.cells if len(run.vertices)}
-    element, highest = solved_among(types), max(map(dimension_of, types), default=0)
-    if element is not None and element.shape.dimension == highest:
-        return element
     solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
-    raise ReadError(f"there are no tetrahedra and no plane mesh of triangles in it (cells: {found})")
+    raise ReadError(f"there are no linear solid elements and no plane mesh of linear elements in it (cells: {found})")
 
 
-def _runs_of(source: Source, element: Element) -> list[int]:
-    return [i for i, run in enumerate(source.cells) if run.type == element.key]
+def _ids(source: Source) -> list[NDArray[np.int64]]:
+    starts = np.cumsum([0, *(len(run.vertices) for run in source.cells)]).tolist()
+    return [ids_of(run, start) for run, start in zip(source.cells, starts, strict=False)]
 
 
 def _are_labels(values: NDArray[Any]) -> bool:
@@ -234,16 +236,18 @@ def _are_labels(values: NDArray[Any]) -> bool:
     return bool(values.dtype.kind in "biu" or (np.isfinite(values) & (values == np.round(values))).all())
 
 
-def _simplices(source: Source, element: Element, copies: NDArray[np.int64] | None = None) -> NDArray[np.int64]:
-    """Return the simplices of the file (k, d+1), repetitions included."""
-    simplices = source.vertices_of(element.key, element.nodes)
-    return simplices if copies is None else copies[simplices]
-
-
-def _copies(points: NDArray[np.float64], simplices: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return for each point the first at its place that a simplex has; itself for what `Mesh.build` will refuse."""
-    used = np.unique(simplices)
+def _copies(points: NDArray[np.float64], solved: Solved) -> NDArray[np.int64]:
+    """Return for each point the first at its place that an element has; itself for what `Mesh.build` will refuse."""
+    used = np.unique(solved.vertices())
     return first_of_each_place(points, used[(used >= 0) & (used < len(points))])
+
+
+def _joined(run: Cells, copies: NDArray[np.int64]) -> Cells:
+    """Return cells that may be solved for with the points that stand for their vertices."""
+    if not isinstance(run.vertices, np.ndarray):
+        return run
+    inside = (run.vertices >= 0) & (run.vertices < len(copies))
+    return replace(run, vertices=np.where(inside, copies[np.where(inside, run.vertices, 0)], run.vertices))
 
 
 def _of_copies(mask: NDArray[np.bool_], copies: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -253,34 +257,18 @@ def _of_copies(mask: NDArray[np.bool_], copies: NDArray[np.int64]) -> NDArray[np
     return marked
 
 
-def _not_judged(source: Source, element: Element) -> dict[str, int]:
-    """Count the cells of the mesh's dimension that are not solved for; others are facets, lines and points."""
-    counts: dict[str, int] = {}
-    for run in source.cells:
-        if run.type != element.key and len(run.vertices) and dimension_of(run.type) == element.shape.dimension:
-            counts[run.type] = counts.get(run.type, 0) + len(run.vertices)
-    return counts
-
-
-def _ids(run: Cells, start: int) -> NDArray[np.int64]:
-    return np.arange(start, start + len(run.vertices)) if run.ids is None else run.ids
-
-
-def _reversed(simplices: NDArray[np.int64], topology: Topology) -> NDArray[np.bool_]:
-    """(k,) bool: of all simplices of the file, those with the negative orientation; repetitions may differ."""
-    if len(topology.source) == len(simplices):
+def _reversed(solved: Solved, topology: Topology) -> NDArray[np.bool_]:
+    """(k,) bool: of all elements of the file, those with the negative orientation; repetitions may differ."""
+    if len(topology.source) == solved.m:
         return topology.flipped
-    order = np.argsort(simplices, axis=1)
-    odd = np.linalg.det(np.eye(simplices.shape[1])[order]) < 0
-    group = np.unique(np.take_along_axis(simplices, order, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
-    positive = np.empty(group.max() + 1, dtype=bool)  # which parity of the sorted vertices is positive
+    odd, group = solved.odd(), solved.groups()
+    positive = np.empty(group.max() + 1, dtype=bool)  # which of the two orders is positive
     positive[group[topology.source]] = odd[topology.source] ^ topology.flipped
     return odd != positive[group]
 
 
-def _solved_points(
-    source: Source, simplices: NDArray[np.int64], dimension: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _solved_points(source: Source, solved: Solved) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    dimension = solved.dimension
     with np.errstate(invalid="ignore"):  # a signalling NaN; Mesh.build tells where there is any
         points = np.asarray(source.points, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] not in (2, 3) or points.shape[1] < dimension:
@@ -288,9 +276,10 @@ def _solved_points(
     if points.shape[1] == dimension:
         return points, None
     flat = np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
-    if simplices.min() < 0 or simplices.max() >= len(points):
+    vertices = solved.vertices()
+    if vertices.min() < 0 or vertices.max() >= len(points):
         return flat, None  # Mesh.build tells what is wrong, here and below
-    used = points[distinct(simplices)]
+    used = points[distinct(vertices)]
     if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
         return flat, None
     basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))
@@ -303,12 +292,10 @@ def _flat(points: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np
         return points @ basis.T
 
 
-def _on_other_cells(source: Source, chosen: list[int], n: int) -> NDArray[np.bool_]:
-    """Vertices of cells that are not solved for: lines, boundary triangles, quadrilaterals, ..."""
+def _on_other_cells(solved: Solved, n: int) -> NDArray[np.bool_]:
+    """Vertices of cells that are not solved for: lines, facets on the boundary, elements of second order, ..."""
     mask = np.zeros(n, dtype=bool)
-    for i, run in enumerate(source.cells):
-        if i in chosen:
-            continue
+    for run in solved.rest:
         for row in [run.vertices] if isinstance(run.vertices, np.ndarray) else run.vertices:
             vertices = np.asarray(row, dtype=np.int64)
             mask[vertices[(vertices >= 0) & (vertices < n)]] = True
@@ -323,12 +310,12 @@ def _fixed_by(source: Source, name: str) -> NDArray[np.bool_]:
     return (values.reshape(len(values), -1) != 0).any(axis=1)
 
 
-def _region_codes(labels: NDArray[Any], simplices: NDArray[np.int64], topology: Topology) -> NDArray[np.int64]:
-    """A number for each simplex of the mesh that stands for its label, or for all labels of its repetitions."""
+def _region_codes(labels: NDArray[Any], solved: Solved, topology: Topology) -> NDArray[np.int64]:
+    """A number for each element of the mesh that stands for its label, or for all labels of its repetitions."""
     codes = np.unique(labels, return_inverse=True)[1].reshape(-1).astype(np.int64)
-    if len(topology.source) == len(simplices):
+    if len(topology.source) == solved.m:
         return codes
-    group = np.unique(np.sort(simplices, axis=1), axis=0, return_inverse=True)[1].reshape(-1)
+    group = solved.groups()
     members: dict[int, set[int]] = {}
     for which, code in zip(group.tolist(), codes.tolist(), strict=True):
         members.setdefault(which, set()).add(code)
@@ -344,12 +331,12 @@ def _with_regions(source: Source, name: str) -> Source:
     return replace(source, regions=(name,), load=lambda: source.arrays)
 
 
-def _notes(mesh: Mesh, rows: int, seen_from_above: bool, copies: NDArray[np.int64] | None) -> tuple[str, ...]:
+def _notes(mesh: Mesh, solved: Solved, seen_from_above: bool, copies: NDArray[np.int64] | None) -> tuple[str, ...]:
     topology, shape = mesh.topology, mesh.topology.element.shape
     one, many = shape.name, shape.plural
     notes = []
-    if topology.m < rows:
-        repeated = counted(rows - topology.m, f"{one} is a repetition", f"{many} are repetitions")
+    if topology.m < solved.m:
+        repeated = counted(solved.m - topology.m, f"{one} is a repetition", f"{many} are repetitions")
         notes.append(f"{repeated} of another and not counted")
     first = first_of_each_place(mesh.points, np.flatnonzero(topology.boundary)) if copies is None else copies
     together, places = count(first)
@@ -365,10 +352,38 @@ def _notes(mesh: Mesh, rows: int, seen_from_above: bool, copies: NDArray[np.int6
     if mirrored == topology.m and seen_from_above:
         which = "the element is" if mirrored == 1 else "the elements are"
     elif 0 < mirrored < topology.m:
-        which = counted(mirrored, f"{one} in a separate part is", f"{many} in separate parts are")
+        which = _types_mirrored(topology) or counted(
+            mirrored, f"{one} in a separate part is", f"{many} in separate parts are"
+        )
     if which:
         kept = "solved so, and the numbering is kept; --fix-orientation would turn it"
         notes.append(f"{which} numbered the other way round (mirrored): {kept}")
     if not mesh.movable.any():
         notes.append("no vertex is free to move")
     return tuple(notes)
+
+
+def _types_mirrored(topology: Topology) -> str:
+    """Name the types that are all numbered the other way round; empty: also others are."""
+    whole = [block for block in topology.blocks if topology.mirrored[block.rows].all()]
+    if sum(len(block.rows) for block in whole) < topology.mirrored.sum():
+        return ""
+    named = [counted(len(block.rows), block.element.shape.name, block.element.shape.plural) for block in whole]
+    return f"{' and '.join(named)} {'is' if len(whole) == len(whole[0].rows) == 1 else 'are'}"
+
+
+def _concave(mesh: Mesh, form: Format) -> tuple[str, ...]:
+    """Say that there are concave quadrilaterals where these may be meant."""
+    if form.name not in DRAWINGS:
+        return ()
+    concave = 0
+    for block in mesh.topology.blocks:
+        if block.element.key == "quad":
+            p = mesh.points[block.vertices]
+            ahead, behind = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
+            corners = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
+            # Where two corners are inside out, sides cross.
+            concave += int((((corners <= 0).sum(axis=1) == 1) & (corners.sum(axis=1) > 0)).sum())
+    if not concave:
+        return ()
+    return (f"{counted(concave, 'quadrilateral is', 'quadrilaterals are')} concave, and a concave one is inverted",)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.elements import solved_among
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.solved import solved_of, solved_runs
 from meshfix_cli.meshfile.source import Cells, ghost_vertices
 from meshfix_cli.meshfile.splice import Points
 
@@ -135,22 +135,20 @@ def by_place(copies: Copies, threads: int = 1) -> Int64:
 def _on_interfaces(copies: Copies, threads: int) -> tuple[Mask, Mask]:
     """Mark the points (n,) that may be on an interface, and those of ghost cells alone.
 
-    The first are on the boundary of the simplices that a piece has for itself, on other cells, or on ghosts.
+    The first are on the boundary of the elements that a piece has for itself, on other cells, or on ghosts.
     """
-    element = solved_among(run.type for run in copies.cells if len(run.vertices))
-    simplices = [run for run in copies.cells if element is not None and run.type == element.key]
-    others = [run for run in copies.cells if element is None or run.type != element.key]
-    own = [run.vertices if run.ghosts is None else run.vertices[~run.ghosts] for run in simplices]
-    members = copies.of_cells(others)
+    chosen = solved_runs(copies.cells)
+    elements = [copies.cells[i] for i in chosen]
+    others = [run for i, run in enumerate(copies.cells) if i not in chosen]
+    own = solved_of([run if run.ghosts is None else Cells(run.type, run.vertices[~run.ghosts]) for run in elements])
+    members = copies.of_cells([*others, *own.rest])
     mine = np.zeros_like(members)
-    if element is not None and any(len(rows) for rows in own):
+    if own.parts:
         # Where they are does not matter here, so a plane in space may be seen from any side.
-        topology = Mesh.build(
-            copies.points[:, : element.shape.dimension], np.concatenate(own), threads=threads
-        ).topology
+        topology = Mesh.build(copies.points[:, : own.dimension], own.blocks, threads=threads).topology
         members |= topology.boundary
         mine = topology.used
-    ghosts = ghost_vertices(simplices, len(members))
+    ghosts = ghost_vertices(elements, len(members))
     if ghosts is None:
         return members, np.zeros_like(members)
     return members | ghosts, ghosts & ~mine

@@ -38,7 +38,7 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     _, axes = np.linalg.eigh(centred.T @ centred)
     normal_vector = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
     if np.abs(centred @ normal_vector).max() > flat:
-        raise ReadError("the triangles form a curved surface; only meshes in a plane, or tetrahedra, can be untangled")
+        raise ReadError("the elements form a curved surface; only plane meshes, and solid elements, can be untangled")
     if np.ptp(centred @ axes[:, 1]) <= flat:
         raise ReadError("all vertices lie on one line")
     return np.stack([axes[:, 2], np.cross(normal_vector, axes[:, 2])])

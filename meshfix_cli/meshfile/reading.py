@@ -36,7 +36,7 @@ def read(
     form: str | None = None,
     threads: int = 1,
 ) -> Document:
-    """Read a triangle or tetrahedral mesh.
+    """Read a mesh of linear elements, all solid or all in a plane.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def read(
     double : bool
         Make coordinates in float32 those of a file in float64.
     fix_orientation : bool
-        Renumber the simplices that have the negative orientation, by exchanging two of their vertices.
+        Renumber the elements that have the negative orientation.
     join_points : bool
         Treat points of exactly equal coordinates as one while solving; each of them is written.
     form : str, optional
@@ -59,7 +59,7 @@ def read(
     Raises
     ------
     ReadError
-        The file cannot be read, holds no mesh of simplices, or not the arrays named.
+        The file cannot be read, holds no mesh of linear elements, or not the arrays named.
     InvalidMeshError
         See `Mesh.build`.
     """

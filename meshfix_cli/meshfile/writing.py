@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, WriteError
-from meshfix_cli.mesh.elements import Element
+from meshfix_cli.mesh.elements import words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import PARTS, Format
 from meshfix_cli.meshfile.reading import parse
+from meshfix_cli.meshfile.solved import in_common_types, solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
 from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing
 
@@ -83,7 +85,7 @@ def write(
             temporary.write_bytes(unmoved)
             return
         try:
-            held, dropped = _write_anew(temporary, source.merged(), points, form, mesh.topology.element)
+            held, dropped = _write_anew(temporary, _merged(source, form), points, form)
         except WriteError as error:
             raise WriteError(f"{target}: {error}") from error
         if form == document.format and source.data is not None:
@@ -113,7 +115,7 @@ def write_cells(
     cell: Mapping[str, NDArray[Any]],
     point: Mapping[str, NDArray[Any]],
 ) -> None:
-    """Write the simplices of a moved mesh with data for each, for programs that draw them.
+    """Write the elements of a moved mesh with data for each, for programs that draw them.
 
     Parameters
     ----------
@@ -130,13 +132,14 @@ def write_cells(
         Nothing was written.
     """
     form = check_cells(document, target)
-    arrays = Arrays(point=point, cell={name: [values] for name, values in cell.items()})
-    source = Source(
-        document.file_points(mesh), [Cells(mesh.topology.element.key, document.simplices)], load=lambda: arrays
-    )
+    parts = document.parts
+    ends = np.cumsum([len(part.vertices) for part in parts])
+    arrays = Arrays(point=point, cell={name: np.split(values, ends[:-1]) for name, values in cell.items()})
+    cells = [Cells(part.key, part.vertices) for part in parts]
+    source = Source(document.file_points(mesh), cells, load=lambda: arrays).merged()
 
     def produce(temporary: Path) -> None:
-        _write_anew(temporary, source, source.points, form, mesh.topology.element)
+        _write_anew(temporary, source, source.points, form)
 
     write_file(target, produce)
 
@@ -210,28 +213,37 @@ def _writable(form: Format, target: str) -> Format:
     return form
 
 
+def _merged(source: Source, form: Format) -> Source:
+    """Return a source with one run for each type, and with no types that only VTK has, where the format is another."""
+    if form.reader in _WITH_CELLS:
+        return source.merged()
+    return replace(source, cells=[in_common_types(run) for run in source.cells], load=lambda: source.arrays).merged()
+
+
 def _write_anew(
-    path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format, element: Element
+    path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Let meshio write, and read it again: return the points (n, d) as the file holds them, and what was dropped.
 
     Raises
     ------
     WriteError
-        The format cannot hold the elements of this type, or rounds them too much.
+        The format cannot hold the elements that are solved for, or rounds them too much.
     """
     from meshfix_cli.meshfile import through_meshio
 
     through_meshio.write(path, source, points, form)
-    kind = element.key, element.nodes
-    expected = source.vertices_of(*kind)
+    runs = [source.cells[i] for i in solved_runs(source.cells)]
+    expected = np.concatenate([run.vertices.ravel() for run in runs])
     held = points.astype(np.float64)
-    size = float(np.ptp(held[expected], axis=(0, 1)).max())
+    size = float(np.ptp(held[expected], axis=0).max())
     try:
         back = parse(path.read_bytes(), form, path)
-        if not len(back.vertices_of(*kind)):
-            raise WriteError(f"cannot be written as {form.name}: that holds no {element.shape.plural}")
-        corners = _spatial(back.points)[back.vertices_of(*kind)]
+        found = [back.vertices_of(run.type, run.vertices.shape[1]) for run in runs]
+        lacking = next((run for run, rows in zip(runs, found, strict=True) if not len(rows)), None)
+        if lacking is not None:
+            raise WriteError(f"cannot be written as {form.name}: that holds no {words(lacking.type)[1]}")
+        corners = _spatial(back.points)[np.concatenate([rows.ravel() for rows in found])]
         difference = np.abs(corners - _spatial(held)[expected]).max()
         dropped = source.lost_in(back)
         if back.arrays.unread:
@@ -242,7 +254,7 @@ def _write_anew(
         raise WriteError(f"cannot be written as {form.name}: what was written does not read back") from error
     if not difference <= ROUNDING * size:
         raise WriteError(f"cannot be written as {form.name}: the coordinates do not read back")
-    held[expected] = corners[:, :, : held.shape[1]]
+    held[expected] = corners[:, : held.shape[1]]
     return held, dropped
 
 

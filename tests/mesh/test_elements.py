@@ -7,7 +7,7 @@ import pytest
 from isoparametric import REGULAR, regular
 from programs import gmsh_session
 
-from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, Element, dimension_of, solved_among
+from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, Element, dimension_of
 from meshfix_cli.meshfile.gmsh.cells import ORDER
 
 linear = pytest.mark.parametrize("element", [ELEMENTS[key] for key in REGULAR], ids=list(REGULAR))
@@ -95,13 +95,6 @@ def test_names_tell_the_dimension() -> None:
     assert {name: dimension_of(name) for name in expected} == expected
     assert dimension_of("polyhedron") == 3
     assert dimension_of("line") == 1
-
-
-def test_what_is_solved_is_of_the_highest_dimension() -> None:
-    assert solved_among(iter(["line", "triangle", "tetra"])) is ELEMENTS["tetra"]
-    assert solved_among(["quad", "triangle"]) is ELEMENTS["triangle"]
-    assert solved_among(["quad"]) is None
-    assert all(element.linear for element in SIMPLICES.values())
 
 
 def test_words() -> None:

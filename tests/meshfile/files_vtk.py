@@ -12,7 +12,8 @@ import pytest
 import shapes
 from numpy.typing import NDArray
 
-AWAY = np.array([[40.0 + x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])  # points of cells that do not move
+# Points of cells that do not move: corners of three boxes.
+AWAY = np.array([[40.0 + x + 2 * i, y, z] for i in range(3) for z in (0, 1) for y in (0, 1) for x in (0, 1)])
 TETRAHEDRON_OF_FACES = [4, 3, 0, 1, 2, 3, 0, 1, 4, 3, 1, 2, 4, 3, 0, 2, 4]
 
 
@@ -93,8 +94,9 @@ def grid(path: Path, version: int, binary: bool, double: bool) -> None:
         faces.InsertNextId(value)
     for tetrahedron in tetrahedra[:half].tolist():
         data.InsertNextCell(vtk.VTK_TETRA, 4, tetrahedron)
-    for kind, size in ((11, 8), (3, 2), (3, 2), (4, 4), (6, 5), (13, 6), (1, 1), (9, 4)):
+    for kind, size in ((11, 8), (3, 2), (3, 2), (4, 4), (6, 5), (1, 1), (9, 4)):
         data.InsertNextCell(kind, size, list(range(n, n + size)))
+    data.InsertNextCell(vtk.VTK_WEDGE, 6, [n + 8 + v for v in (0, 1, 2, 4, 5, 6)])
     data.InsertNextCell(vtk.VTK_POLYHEDRON, faces)
     for tetrahedron in tetrahedra[half:].tolist():
         data.InsertNextCell(vtk.VTK_TETRA, 4, tetrahedron)
@@ -109,8 +111,8 @@ def polydata(path: Path, version: int, binary: bool, double: bool) -> None:
     n = len(points)
     data = vtk.vtkPolyData()
     data.SetPoints(_points(vtk, np.vstack([points, AWAY * [1, 1, 0]]), double))
-    others = {"Verts": [[0], [1, 2]], "Lines": [[0, 1], [1, 2, 3], [4, 5]], "Strips": [[0, 1, 2, 3], [2, 3, 4]]}
-    polygons = [*triangles[:9].tolist(), [n, n + 2, n + 6, n + 4], *triangles[9:].tolist(), list(range(n, n + 5))]
+    others = {"Verts": [[0], [1, 2]], "Lines": [[0, 1], [1, 2, 3], [4, 5]], "Strips": [[8, 9, 10, 11], [16, 17, 18]]}
+    polygons = [*triangles[:9].tolist(), [n, n + 1, n + 3, n + 2], *triangles[9:].tolist(), list(range(n, n + 5))]
     for name, cells in {**{k: [[n + v for v in c] for c in v] for k, v in others.items()}, "Polys": polygons}.items():
         array = vtk.vtkCellArray()
         for cell in cells:
@@ -141,14 +143,13 @@ def old_text(path: Path, end: str, version: str, kind: str) -> None:
     """Small letters, blank lines, cells that are wrapped, and the attributes of old programs."""
     points, triangles = shapes.plate()
     n, m = len(points), len(triangles)
-    words = " ".join(f"{4 if i == 5 else 3}" + "".join(f"  {v}" for v in (*t, t[2])[: 4 if i == 5 else 3]) for i, t in
-                     enumerate(triangles.tolist()) if i != 5).split()  # fmt: skip
+    words = " ".join("3" + "".join(f"  {v}" for v in t) for i, t in enumerate(triangles.tolist()) if i != 5).split()
     lines = [
         f"# vtk DataFile Version {version}", "by an old program, in 1996", "ascii", "", "dataset unstructured_grid", "",
         f"points {n} {kind}", *(f"  {x:+.6f}\t{y:.6E}  {z:g}" for x, y, z in points.tolist()), "",
-        f"cells {m + 1} {4 * (m - 1) + 3 + 5}", "2 0 1",
-        *(" ".join(words[i : i + 7]) for i in range(0, len(words), 7)), "4 0 1 2 3", "",
-        f"cell_types {m + 1}", "3", *["5"] * (m - 1), "9", "",
+        f"cells {m + 1} {4 * (m - 1) + 3 + 6}", "2 0 1",
+        *(" ".join(words[i : i + 7]) for i in range(0, len(words), 7)), "5 0 1 2 3 4", "",
+        f"cell_types {m + 1}", "3", *["5"] * (m - 1), "7", "",
         f"point_data {n}", "scalars level float", "lookup_table grey", *map(str, range(n)),
         "lookup_table grey 2", "0 0 0 1", "1 1 1 1",
         "color_scalars colour 3", *["0.5 0.25 1"] * n, "vectors speed double", *["1 2 3"] * n,

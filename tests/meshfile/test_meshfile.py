@@ -382,7 +382,7 @@ def test_what_a_format_cannot_hold_is_named(tmp_path: Path) -> None:
     document = read(SAMPLES / "plate_tangled.obj")
     assert write(document, document.mesh, tmp_path / "out.off")[1] == ("comments", "objects and groups")
     points = np.column_stack([document.mesh.points, np.zeros(document.mesh.topology.n)])
-    cells = [("triangle", document.simplices), ("line", [[0, 1]]), ("vertex", [[3]])]
+    cells = [("triangle", document.parts[0].vertices), ("line", [[0, 1]]), ("vertex", [[3]])]
     meshio.Mesh(points, cells, point_data={"a b": points[:, 0]}).write(tmp_path / "in.vtu")
     rich = read(tmp_path / "in.vtu")
     lost = ("line cells", "vertex cells", "point data a b", "comments")

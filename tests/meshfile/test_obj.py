@@ -63,12 +63,12 @@ def test_faces_of_many_corners() -> None:
         assert numbers in next(run.vertices.tolist() for run in parse(data).cells if run.vertices.shape[1] == count)
 
 
-def test_vertices_of_quadrilaterals_lines_and_points_are_held(tmp_path: Path) -> None:
+def test_vertices_of_polygons_lines_and_points_are_held(tmp_path: Path) -> None:
     """Two interior vertices; what else names one of them holds it."""
     ring = [(np.cos(t), np.sin(t)) for t in np.arange(6) * np.pi / 3]
     lines = [f"v {x} {y} 0" for x, y in [*ring, (0.3, 0.0), (-0.3, 0.1)]]
     faces = ["f 7 8 2", "f 7 2 1", "f 7 1 6", "f 7 6 8", "f 8 6 5", "f 8 5 4", "f 8 4 3", "f 8 3 2"]
-    for more, free in (("", 2), ("p 7", 1), ("l 7 1", 1), ("f 7 1 2 8", 0), ("p 1", 2)):
+    for more, free in (("", 2), ("p 7", 1), ("l 7 1", 1), ("f 7 1 2 3 8", 0), ("p 1", 2)):
         path = tmp_path / "mesh.obj"
         path.write_text("\n".join([*lines, *faces, more]))
         assert read(path).mesh.movable.sum() == free

@@ -200,7 +200,7 @@ def test_a_vertex_that_its_piece_does_not_have_is_not_that_of_the_next(tmp_path:
         read(tmp_path / "wrong.vtu")
 
 
-def test_polyhedra_and_wedges_are_held(tmp_path: Path) -> None:
+def test_polyhedra_are_held_and_wedges_are_solved(tmp_path: Path) -> None:
     io = pytest.importorskip("vtkmodules.vtkIOXML")
     points, cells = block()
     grid = filled(points, cells)
@@ -220,9 +220,10 @@ def test_polyhedra_and_wedges_are_held(tmp_path: Path) -> None:
         assert writer.Write()
         source = parsed((tmp_path / "mixed.vtu").read_bytes())
         found = {run.type: run.vertices.tolist() for run in source.cells}
-        assert found["wedge"] == [[3, 5, 4, 6, 8, 7]]
+        assert found["wedge"] == [[3, 4, 5, 6, 7, 8]]
         assert sorted(found["polyhedron"][0]) == [9, 10, 11, 12]
         document = read(tmp_path / "mixed.vtu")
+        assert document.not_judged == {"polyhedron": 1}
         assert not document.mesh.movable[[*range(3, 13)]].any()
         target, others = read_independently(tmp_path / "mixed.vtu")
         after, others_after = read_by_vtk(moved(source)[1], tmp_path)

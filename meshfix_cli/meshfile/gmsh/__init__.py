@@ -14,10 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, naming
-from meshfix_cli.mesh.elements import counted, solved_among
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.gmsh.cells import ORDER, TYPES
 from meshfix_cli.meshfile.gmsh.numbers import Int64
 from meshfix_cli.meshfile.gmsh.sections import Block, File, Numbers, UnknownError, read
+from meshfix_cli.meshfile.solved import solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 
@@ -147,13 +148,9 @@ def _ids(cells: Sequence[Cells]) -> Int64:
 
 
 def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
-    """The array of groups, if a simplex is in one."""
+    """The array of groups, if an element that is solved for is in one."""
     name = _SETS if _SETS in labels else _PHYSICAL
-    element = solved_among(run.type for run in cells)
-    if element is None:
-        return ()
-    runs = zip(cells, labels.get(name, ()), strict=False)
-    return (name,) if any(run.type == element.key and values.any() for run, values in runs) else ()
+    return (name,) if name in labels and any(labels[name][i].any() for i in solved_runs(cells)) else ()
 
 
 def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, list[Int64]]) -> Arrays:

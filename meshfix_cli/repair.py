@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from meshfix_cli.errors import RequirementError, WriteError
 from meshfix_cli.mesh.elements import counted, words
-from meshfix_cli.quality.metrics import METRICS, having
+from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import SMOOTH, Smooth, plan
 
@@ -205,10 +205,10 @@ class Judge:
     brief: bool = False
 
     def check(self, document: Document) -> None:
-        """Refuse, as a RequirementError, to judge a mesh by a metric that none of its elements has."""
+        """Refuse, as a RequirementError, to judge a mesh by what none of its elements has."""
         for one in self.requirements:
-            if one.is_metric and not having(one.name, document.mesh):
-                *others, last = (words(key)[1] for key in METRICS[one.name].elements)
+            if not having(one.name, document.mesh):
+                *others, last = (words(key)[1] for key in types_with(one.name))
                 have = f"{', '.join(others)} and {last}"
                 raise RequirementError(f"{document.name}: no element has the {one.name} required; only {have} have one")
 
@@ -312,13 +312,14 @@ def repair(
 def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
     """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded.
 
-    `asked`: better angles were asked for.
+    `asked`: better elements were asked for.
     """
     nothing = "no element that is judged" if document.not_judged else "no element"
+    none = "no angle" if document.mesh.topology.simplicial else "none"
     if outcome.after is outcome.before and outcome.valid:
         if len(outcome.records) > 1:
-            return (f"{nothing} is inverted and no angle could be made better: nothing was moved",)
-        angles = " and no angle is below what --threshold asks for" * asked
+            return (f"{nothing} is inverted and {none} could be made better: nothing was moved",)
+        angles = f" and {none} is below what --threshold asks for" * asked
         return (f"{nothing} is inverted{angles}: nothing was moved",)
     if outcome.records[-1].inverted or not rounded:
         return ()

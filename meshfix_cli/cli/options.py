@@ -119,12 +119,14 @@ class Show:
         """Return what is to be found out: little where nothing is shown."""
         return Judge(self.metrics, requirements, self.threads, brief=self.quiet and not draw.names)
 
-    def print(self, report: Report, stream: Any) -> None:
-        """Print a report as it is asked for."""
+    def print(self, report: Report, stream: Any, by_type: bool = False) -> None:
+        """Print a report as it is asked for; `by_type`: with a table by types of elements."""
         from meshfix_cli.report.terminal import console, print_json, print_report
 
-        if not self.quiet:
-            (print_json if self.as_json else print_report)(report, console(stream))
+        if self.as_json:
+            print_json(report, console(stream))
+        elif not self.quiet:
+            print_report(report, console(stream), by_type)
 
 
 @dataclass(frozen=True)
@@ -268,8 +270,8 @@ solving = packed(
         "--threshold",
         type=_Range(0, 90),
         metavar="DEGREES",
-        help="Optimise stars with smaller angles. "
-        f"[default: {THRESHOLD[2]:g} for triangles, {THRESHOLD[3]:g} for tets]",
+        help="Optimise stars with smaller angles or, of elements that are not simplices, scaled Jacobians below its "
+        f"sine. [default: {THRESHOLD[2]:g} for plane meshes, {THRESHOLD[3]:g} for solids]",
     ),
     click.option("--max-move", type=LENGTH, help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),

@@ -56,6 +56,6 @@ def quality(
             complain(str(error))
             codes.add(ERROR)
             continue
-        show.print(report, sys.stdout)
+        show.print(report, sys.stdout, by_type=True)
         codes.add(VALID if report.valid and report.met else INVERTED)
     sys.exit(max(codes) if ERROR not in codes else SOME_FAILED if len(sources) > 1 else ERROR)

@@ -45,7 +45,9 @@ if TYPE_CHECKING:
 @drawing_cells
 @drawing
 @allowing
-@click.option("--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes.")
+@click.option(
+    "--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes, and a table by types."
+)
 @click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
 @requiring
 @holding
@@ -101,7 +103,7 @@ def untangle(
         if cells is not None:
             write_cells(document, report.mesh, cells, show.threads)
         draw.write(report, show.threads)
-        show.print(report, report_stream(files))
+        show.print(report, report_stream(files), verbose)
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 

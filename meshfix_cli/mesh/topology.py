@@ -142,6 +142,11 @@ class Topology:
         return mask
 
     @cached_property
+    def positions(self) -> NDArray[np.int32]:
+        """(m,) int32: where each simplex stands in the connectivity."""
+        return self.of_rows(np.arange(self.m, dtype=np.int32))
+
+    @cached_property
     def number(self) -> NDArray[np.int32]:
         """(n,) int32: the number of each vertex in the connectivity; 0 for isolated points."""
         numbers = np.zeros(self.n, dtype=np.int32)

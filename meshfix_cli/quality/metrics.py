@@ -43,6 +43,7 @@ class Metric:
 NUMBERS = (
     "elements", "inverted", "folded", "min_measure", "min_angle", "max_angle", "mean_min_angle", "percentile_1",
 )  # fmt: skip
+ANGLES = NUMBERS[4:]  # of these, those of elements that have angles
 
 METRICS = {
     "min_angle": Metric("min", _FLAT),  # degrees, without sign; dihedral for tetrahedra
@@ -55,6 +56,16 @@ METRICS = {
 }
 
 
+def types_with(name: str) -> tuple[str, ...]:
+    """Return the keys of the types that have a metric, or one of `NUMBERS`."""
+    if name in ANGLES:
+        return _FLAT
+    return METRICS[name].elements if name in METRICS else _ALL
+
+
 def having(name: str, mesh: Mesh) -> int:
-    """Return how many elements have a metric."""
-    return sum(len(block.rows) for block in mesh.topology.blocks if block.element.key in METRICS[name].elements)
+    """Return how many elements have a metric, or one of `NUMBERS`."""
+    topology, types = mesh.topology, types_with(name)
+    if topology.simplicial:
+        return topology.m if topology.element.key in types else 0
+    return sum(len(block.rows) for block in topology.blocks if block.element.key in types)

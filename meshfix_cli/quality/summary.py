@@ -210,8 +210,11 @@ def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: in
         Rows of the inverted elements, as in `Summary.inverted_elements`.
     count, threads : int
     """
-    judged = Judged(mesh.topology.connectivity)
-    badness = -mesh.topology.of_rows(judged.angles(mesh.along_curve(mesh.points), threads))
+    if mesh.topology.simplicial:
+        judged = Judged(mesh.topology.connectivity)
+        badness = -mesh.topology.of_rows(judged.angles(mesh.along_curve(mesh.points), threads))
+    else:
+        badness = -evaluate("scaled_jacobian", mesh)
     badness[inverted] += 2 * math.pi
     return np.argsort(-badness, kind="stable")[:count]
 
@@ -264,5 +267,7 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     stuck = mesh.stuck(threads)
     if len(stuck) == 0:
         return None
-    smallest = float(Judged(mesh.topology.connectivity, stuck).angles(mesh.along_curve(mesh.points), threads).min())
-    return math.degrees(smallest) if mesh.topology.simplicial else math.sin(smallest)
+    if not mesh.topology.simplicial:
+        return float(evaluate("scaled_jacobian", mesh)[mesh.topology.connectivity.rows[stuck]].min())
+    judged = Judged(mesh.topology.connectivity, stuck)
+    return math.degrees(float(judged.angles(mesh.along_curve(mesh.points), threads).min()))

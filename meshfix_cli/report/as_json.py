@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from meshfix_cli import __version__
 from meshfix_cli.quality.metrics import NUMBERS, having
-from meshfix_cli.quality.summary import BIN_WIDTH, Summary
-from meshfix_cli.report.facts import Report, first_inverted
+from meshfix_cli.quality.summary import Kind, Summary
+from meshfix_cli.report.facts import Report, binned, first_inverted
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
@@ -22,7 +22,8 @@ SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
 def to_json(report: Report) -> dict[str, Any]:
     """Return the facts of the table under stable names; angles in degrees, times in seconds, lengths of the model.
 
-    The numbers of the result stand at the top, and among those of all stages under "quality".
+    The numbers of the result stand at the top, and among those of all stages under "quality"; what no element has is
+    null.
     """
     mesh, result = report.mesh, report.result
     return {
@@ -37,10 +38,10 @@ def to_json(report: Report) -> dict[str, Any]:
         "not_judged": dict(report.not_judged),
         "misnumbered": report.misnumbered,
         "mirrored": int(mesh.topology.mirrored.sum()),
-        **{name: getattr(result, name) for name in NUMBERS},
+        **{name: _finite(getattr(result, name)) for name in NUMBERS},
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary, mesh) for stage, summary in report.stages.items()},
-        "first_inverted": [{"id": i, "centroid": c} for i, c in first_inverted(report)],
+        "first_inverted": [{"id": i, "centroid": c} for _, i, c in first_inverted(report)],
         "inverted_without_free_vertex": len(report.obstacles.inverted),
         "obstacles": {
             field.name: report.ids[getattr(report.obstacles, field.name)].tolist() for field in fields(report.obstacles)
@@ -70,20 +71,22 @@ def history_csv(records: Iterable[SweepRecord]) -> str:
 
 
 def _summary_json(summary: Summary, mesh: Mesh) -> dict[str, Any]:
-    values: dict[str, Any] = {
-        "inverted": summary.inverted,
-        "folded": summary.folded,
-        "min_measure": summary.min_measure,
-        "min_angle": summary.min_angle,
-        "max_angle": summary.max_angle,
-        "mean_min_angle": summary.mean_min_angle,
-        "percentile_1": summary.percentile_1,
-        "histogram": {"bin_width": BIN_WIDTH, "counts": list(summary.histogram)},
-    }
+    values: dict[str, Any] = {name: _finite(getattr(summary, name)) for name in NUMBERS if name != "elements"}
+    bins = binned(mesh)
+    values["histogram"] = {"of": bins.key, "bin_width": bins.width, "counts": list(summary.histogram)}
+    if summary.jacobians is not None:
+        values["scaled_jacobian"] = asdict(summary.jacobians)
+    if summary.kinds:
+        values["types"] = {one.element.key: _kind_json(one) for one in summary.kinds}
     if summary.to_reference is not None:
         values["to_reference"] = dict(zip(("smallest", "mean"), summary.to_reference, strict=True))
     values["metrics"] = {name: _metric_json(name, pair, mesh) for name, pair in summary.metrics.items()}
     return values
+
+
+def _kind_json(kind: Kind) -> dict[str, Any]:
+    jacobians = {"smallest": kind.smallest, "mean": kind.mean}
+    return {"count": kind.count, "inverted": kind.inverted, "inside": kind.inside, "scaled_jacobian": jacobians}
 
 
 def _metric_json(name: str, values: tuple[float, float], mesh: Mesh) -> dict[str, float | None]:

@@ -6,21 +6,24 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import counted, words
+from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.quality.metrics import having
+from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.quality.requirement import Requirement
-from meshfix_cli.quality.summary import Summary
+from meshfix_cli.quality.summary import BIN_WIDTH, JACOBIAN_BINS, Summary
 
 if TYPE_CHECKING:
     from meshfix_cli.quality.obstacles import Obstacles
     from meshfix_cli.solve.records import SweepRecord
 
+Row = tuple[str, list[str]]  # of a table: a label, and a value for each column
 LISTED = 10  # inverted elements named in the report
 
 # By command, the words between the number of elements that are inverted and "inverted"; of others they "are".
@@ -45,12 +48,13 @@ class Report:
     points : callable
         Gives the result (n, 2) or (n, 3) float in the coordinates of the file.
     ids : (m,) int64
-        The file's numbers of the simplices.
+        The file's numbers of the elements.
     stages : dict
         Summaries by name in the order of the table's columns; the last is that of the result. A brief report has no
         others.
     ceiling : float or None
-        Degrees; the smallest angle that fixed vertices set.
+        The smallest angle in degrees, or scaled Jacobian where elements are not all simplices, that fixed vertices
+        set.
     obstacles : Obstacles
         What makes a valid mesh impossible.
     fixed : dict
@@ -125,14 +129,15 @@ class Tally:
         Of the meshes that were read.
     inverted : [int, int]
         Before and after; files that were skipped count only after.
-    angle : [float, float]
-        The worst of the smallest angles, degrees.
+    angle, jacobian : [float, float]
+        The worst of the smallest angles, degrees, and of the smallest scaled Jacobians: infinite where there are none.
     """
 
     statuses: Counter[str] = field(default_factory=Counter)
     elements: int = 0
     inverted: list[int] = field(default_factory=lambda: [0, 0])
     angle: list[float] = field(default_factory=lambda: [math.inf, math.inf])
+    jacobian: list[float] = field(default_factory=lambda: [math.inf, math.inf])
 
     def add(self, result: Mapping[str, Any]) -> None:
         """Count one more."""
@@ -141,7 +146,10 @@ class Tally:
         for i, summary in enumerate(before_and_after(result)):
             if summary is not None:
                 self.inverted[i] += summary["inverted"]
-                self.angle[i] = min(self.angle[i], summary["min_angle"])
+                if summary["min_angle"] is not None:
+                    self.angle[i] = min(self.angle[i], summary["min_angle"])
+                if "scaled_jacobian" in summary:
+                    self.jacobian[i] = min(self.jacobian[i], summary["scaled_jacobian"]["smallest"])
 
 
 def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
@@ -157,35 +165,74 @@ def kept(result: Mapping[str, Any]) -> dict[str, Any]:
     return {**{name: result.get(name) for name in names}, "before": before, "after": after}
 
 
+@dataclass(frozen=True)
+class Binned:
+    """What the histograms of a report count elements by.
+
+    Attributes
+    ----------
+    key : str
+        The metric.
+    name, long_name : str
+        Shorter and longer words for its values.
+    unit : str
+        "": none.
+    width : float
+        Of a bin.
+    """
+
+    key: str
+    name: str
+    long_name: str
+    unit: str
+    width: float
+
+    @property
+    def label(self) -> str:
+        """What stands at an axis or at the head of a column."""
+        return f"{self.long_name} [{self.unit}]" if self.unit else self.long_name
+
+    @property
+    def heading(self) -> str:
+        """What stands above a chart."""
+        return f"{self.long_name[0].upper()}{self.long_name[1:]}s"
+
+
+def binned(mesh: Mesh) -> Binned:
+    """Return what `Summary.histogram` counts."""
+    if mesh.topology.simplicial:
+        return Binned("min_angle", "smallest angle", f"smallest {mesh.topology.element.shape.angle}", "°", BIN_WIDTH)
+    return Binned("scaled_jacobian", "scaled Jacobian", "scaled Jacobian", "", 1 / JACOBIAN_BINS)
+
+
 def title(report: Report) -> str:
     """Return what the mesh is, in one line."""
-    mesh = report.mesh
-    shape, held = mesh.topology.element.shape, ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
+    mesh, kinds = report.mesh, [(one.count, one.element) for one in report.result.kinds]
+    held = ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
     vertices = counted(int(mesh.topology.used.sum()), "vertex", "vertices")
-    elements, free = counted(mesh.topology.m, shape.name, shape.plural), int(mesh.movable.sum())
-    return f"{report.name}: {elements}, {vertices}: {free:,} free{f', fixed {held}' if held else ''}"
+    elements = [
+        counted(count, element.shape.name, element.shape.plural)
+        for count, element in kinds or [(mesh.topology.m, mesh.topology.element)]
+    ]
+    free = f"{int(mesh.movable.sum()):,} free"
+    return f"{report.name}: {', '.join([*elements, vertices])}: {free}{f', fixed {held}' if held else ''}"
 
 
-def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
+def quality_rows(report: Report) -> list[Row]:
     """Return the rows of the quality table: a label, and the value of each stage."""
     flat, stages = report.mesh.dimension == 2, list(report.stages.values())
-    shape = report.mesh.topology.element.shape
-    angle = shape.angle
 
-    def row(label: str, form: str, field: str) -> tuple[str, list[str]]:
-        return label, [format(getattr(summary, field), form) for summary in stages]
+    def row(label: str, form: str, value: Callable[[Summary], float]) -> Row:
+        return label, [format(value(summary), form) for summary in stages]
 
+    inside = row("of these invalid inside only", ",", lambda one: sum(kind.inside for kind in one.kinds))
     rows = [
-        row("inverted elements", ",", "inverted"),
-        row("folded interior edges" if flat else "folded interior faces", ",", "folded"),
-        row(f"smallest {shape.measure}", ".3g", "min_measure"),
-        row(f"smallest {angle} [°]", ".3f", "min_angle"),
-        row(f"largest {angle} [°]", ".3f", "max_angle"),
-        row(f"mean smallest {angle} [°]", ".2f", "mean_min_angle"),
-        row("1st percentile [°]", ".2f", "percentile_1"),
+        row("inverted elements", ",", lambda one: one.inverted),
+        *([inside] if is_some_inside(report) else []),
+        row("folded interior edges" if flat else "folded interior faces", ",", lambda one: one.folded),
+        row(f"smallest {report.mesh.topology.element.shape.measure}", ".3g", lambda one: one.min_measure),
+        *(_angles(report, row) if report.mesh.topology.simplicial else _jacobians(report, row)),
     ]
-    if report.ceiling is not None:
-        rows.append(("ceiling set by fixed vertices [°]", [""] * (len(stages) - 1) + [f"{report.ceiling:.3f}"]))
     if report.result.to_reference is not None:
         pairs = (summary.to_reference for summary in stages)
         worst = ["{:.3f} / {:.3f}".format(*pair) for pair in pairs if pair is not None]
@@ -195,6 +242,55 @@ def quality_rows(report: Report) -> list[tuple[str, list[str]]]:
         label = f"{name} of {share}, worst / mean" if share else f"{name}, worst / mean"
         rows.append((label, [form.format(*summary.metrics[name]) for summary in stages]))
     return rows
+
+
+def is_some_inside(report: Report) -> bool:
+    """Whether in any stage an element is invalid though all of its corners are valid."""
+    return any(kind.inside for one in report.stages.values() for kind in one.kinds)
+
+
+def _angles(report: Report, row: Callable[..., Row]) -> Iterator[Row]:
+    """Give the rows that tell how good simplices are."""
+    angle = report.mesh.topology.element.shape.angle
+    yield row(f"smallest {angle} [°]", ".3f", lambda one: one.min_angle)
+    yield row(f"largest {angle} [°]", ".3f", lambda one: one.max_angle)
+    yield row(f"mean smallest {angle} [°]", ".2f", lambda one: one.mean_min_angle)
+    yield row("1st percentile [°]", ".2f", lambda one: one.percentile_1)
+    yield from _ceiling(report, "ceiling set by fixed vertices [°]")
+
+
+def _jacobians(report: Report, row: Callable[..., Row]) -> Iterator[Row]:
+    """Give the rows that tell how good other elements are, and the angles of those that have angles."""
+    yield row("smallest scaled Jacobian", ".3f", lambda one: one.jacobians.smallest)
+    yield row("mean scaled Jacobian", ".3f", lambda one: one.jacobians.mean)
+    yield row("1st percentile", ".3f", lambda one: one.jacobians.percentile_1)
+    yield from _ceiling(report, "ceiling set by fixed vertices")
+    kinds = [one.element for one in report.result.kinds]
+    some = [one.shape for one in kinds if one.key in types_with("min_angle")]
+    if some:
+        among = "" if len(some) == len(kinds) else f" of {' and '.join(one.plural for one in some)}"
+        yield row(f"smallest {some[0].angle}{among} [°]", ".3f", lambda one: one.min_angle)
+        yield row(f"largest {some[0].angle}{among} [°]", ".3f", lambda one: one.max_angle)
+
+
+def _ceiling(report: Report, label: str) -> Iterator[Row]:
+    if report.ceiling is not None:
+        yield label, [""] * (len(report.stages) - 1) + [f"{report.ceiling:.3f}"]
+
+
+def kind_rows(report: Report) -> tuple[list[str], list[Row]]:
+    """Return the columns and the rows of a table of the result's elements by their types: nothing for one type."""
+    kinds = report.result.kinds
+    if len(kinds) < 2:
+        return [], []
+    rows = [
+        ("elements", [f"{one.count:,}" for one in kinds]),
+        ("inverted", [f"{one.inverted:,}" for one in kinds]),
+        ("of these invalid inside only", [f"{one.inside:,}" for one in kinds]),
+        ("smallest scaled Jacobian", [f"{one.smallest:.3f}" for one in kinds]),
+        ("mean scaled Jacobian", [f"{one.mean:.3f}" for one in kinds]),
+    ]
+    return [one.element.shape.plural for one in kinds], rows
 
 
 def phases(report: Report) -> Iterator[str]:
@@ -239,7 +335,7 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
             text += f"; the first {LISTED}:" if count > LISTED and not report.everything else ":"
         lines.append(text)
     if count and listing:
-        lines += [f"  element {i} at ({', '.join(f'{x:.6g}' for x in c)})" for i, c in first_inverted(report)]
+        lines += [f"  {name} at ({', '.join(f'{x:.6g}' for x in c)})" for name, _, c in first_inverted(report)]
     lines += _impossible(report)
     if report.misnumbered:
         what, it = ("element is", "it") if report.misnumbered == 1 else ("elements are", "them")
@@ -262,17 +358,44 @@ def _impossible(report: Report) -> Iterator[str]:
         )
     for pairs, what in ((found.crossing, "crosses itself"), (found.folding, "folds back upon itself")):
         if count := len(pairs):
-            first = report.ids[pairs[: report.listed]].tolist()
-            which = ", ".join(f"{a} and {b}" for a, b in first) + ", ..." * (len(first) < count)
-            yield f"IMPOSSIBLE: the fixed boundary {what} in {counted(count, 'place', 'places')} (elements {which})"
+            places = counted(count, "place", "places")
+            yield f"IMPOSSIBLE: the fixed boundary {what} in {places} ({_some_pairs(report, pairs)})"
     if len(found.overlapping):
         yield f"IMPOSSIBLE: separate parts of the mesh overlap ({_some(report, found.overlapping)})"
 
 
 def _some(report: Report, rows: NDArray[np.integer[Any]]) -> str:
     """Name the first of some elements as the file does."""
-    ids = report.ids[rows[: report.listed]].tolist()
-    return f"{'element' if len(rows) == 1 else 'elements'} {', '.join(map(str, ids))}{', ...' * (len(ids) < len(rows))}"
+    first = rows[: report.listed]
+    named = []
+    numbers = zip(_shapes(report.mesh, first), report.ids[first].tolist(), strict=True)
+    for shape, group in groupby(numbers, itemgetter(0)):
+        ids = [str(number) for _, number in group]
+        named.append(f"{shape.name if len(ids) == 1 else shape.plural} {', '.join(ids)}")
+    return f"{', '.join(named)}{', ...' * (len(first) < len(rows))}"
+
+
+def _some_pairs(report: Report, pairs: NDArray[np.integer[Any]]) -> str:
+    """Name the first of some pairs of elements."""
+    first = pairs[: report.listed]
+    more = ", ..." * (len(first) < len(pairs))
+    if report.mesh.topology.simplicial:
+        return f"elements {', '.join(f'{a} and {b}' for a, b in report.ids[first].tolist())}{more}"
+    return f"{', '.join(' and '.join(names(report, pair)) for pair in first)}{more}"
+
+
+def names(report: Report, rows: NDArray[np.integer[Any]]) -> list[str]:
+    """Return what elements are called: by the file's numbers and, where not all are simplices, their types."""
+    shapes = _shapes(report.mesh, rows)
+    return [f"{shape.name} {number}" for shape, number in zip(shapes, report.ids[rows].tolist(), strict=True)]
+
+
+def _shapes(mesh: Mesh, rows: NDArray[np.integer[Any]]) -> list[Shape]:
+    """Return the shapes of elements, whose words name them; simplices are called elements."""
+    topology = mesh.topology
+    if topology.simplicial:
+        return [MIXED[mesh.dimension].shape] * len(rows)
+    return [JUDGED[code].shape for code in topology.of_rows(topology.connectivity.codes)[rows].tolist()]
 
 
 def not_judged(report: Report) -> str:
@@ -287,12 +410,12 @@ def required(report: Report) -> Iterator[tuple[bool, str]]:
     """Yield for each requirement whether it is met, and the same in words."""
     for one in report.requirements:
         met = one.holds(report.result)
-        among = f", among {share}" if one.is_metric and (share := _share(report, one.name)) else ""
+        among = f", among {share}" if (share := _share(report, one.name)) else ""
         yield met, f"{'met' if met else 'NOT MET'}: {one} (it is {one.value(report.result):g}{among})"
 
 
 def _share(report: Report, metric: str) -> str:
-    """Say how many elements have a metric; nothing, where all have it."""
+    """Say how many elements have a metric, or one of `metrics.NUMBERS`; nothing, where all have it."""
     count, total = having(metric, report.mesh), report.mesh.topology.m
     return "" if count == total else f"{count:,} of {counted(total, 'element', 'elements')}"
 
@@ -308,10 +431,16 @@ def _perturbed(facts: Mapping[str, Any]) -> str:
     return f"moved {moved} by {facts['distance']:.6g} (seed {facts['seed']})"
 
 
-def first_inverted(report: Report) -> list[tuple[int, list[float]]]:
-    """Return the number of each inverted element that is listed, and its centroid in the coordinates of the file."""
+def first_inverted(report: Report) -> list[tuple[str, int, list[float]]]:
+    """Return the name and the number of each inverted element that is listed, and its centroid."""
     first = report.result.inverted_elements[: report.listed]
     if not len(first):
         return []
-    centroids = report.points()[report.mesh.topology.simplices[first]].mean(axis=1, dtype=np.float64)
-    return [(int(report.ids[i]), c) for i, c in zip(first, centroids.tolist(), strict=True)]
+    return list(zip(names(report, first), report.ids[first].tolist(), centroids(report, first).tolist(), strict=True))
+
+
+def centroids(report: Report, rows: NDArray[np.integer[Any]]) -> NDArray[np.float64]:
+    """Return the means of the nodes (k, 2 or 3) of elements, in the coordinates of the file."""
+    mesh, topology = report.mesh, report.mesh.topology
+    points = report.points().astype(np.float64)
+    return topology.centroids(mesh.along_curve(points), topology.positions[rows])

@@ -10,15 +10,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli import kernels
+from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.mixed import MixedTopology
+from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import Summary, worst_first
-from meshfix_cli.report.facts import Report
+from meshfix_cli.report.facts import Report, centroids, names
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
 
 WORST = 10  # elements of the result that are named and marked
-MOST_CELLS = 100_000  # triangles of a plane mesh that are all drawn
+MOST_CELLS = 100_000  # elements of a plane mesh that are all drawn
 MOST_INVERTED = 20_000  # inverted elements that are drawn of each stage
 MOST_FACETS = 150_000  # of the boundary; above it is drawn on a grid, which has so many cells along its longest side:
 GRID = 512
@@ -27,6 +29,8 @@ CREASE = 30.0  # degrees between two facets of the boundary, above which their e
 
 Points = NDArray[np.float64]
 Rows = NDArray[np.int32]
+Cells = Mapping[str, Rows]  # vertices (m, nodes) of elements, by their type
+FACETS = {2: "line", 3: "triangle", 4: "quad"}  # by the number of their vertices
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,22 +41,27 @@ class State:
     ----------
     points : (k, d) float64
         In model units, as the solver has them.
-    cells, inverted, worst : (m, d+1) int32
+    cells, inverted, worst : dict of (m, nodes) int32
         Rows of `points`: all elements where they can all be drawn, those inverted, the worst (of the result alone).
     left_out : int
         Inverted elements that are not drawn.
     """
 
     points: Points
-    cells: Rows
-    inverted: Rows
-    worst: Rows
+    cells: Cells
+    inverted: Cells
+    worst: Cells
     left_out: int
+
+    @property
+    def drawn(self) -> int:
+        """How many inverted elements are drawn."""
+        return number_of(self.inverted)
 
     @property
     def count(self) -> int:
         """How many elements are inverted."""
-        return len(self.inverted) + self.left_out
+        return self.drawn + self.left_out
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +72,8 @@ class Scene:
     ----------
     boundary : (k, d) float64
         Vertices of the boundary, which no stage moves.
-    facets : (f, d) int32
-        Its facets, oriented, as rows of `boundary`.
+    facets : dict of (f, 2, 3 or 4) int32
+        Its facets, oriented, as rows of `boundary`, by their type.
     creases : (e, 2) int32
         Edges of a boundary in space at which it has a corner; none where it is coarse.
     coarse : bool
@@ -74,7 +83,7 @@ class Scene:
     """
 
     boundary: Points
-    facets: Rows
+    facets: Cells
     creases: Rows
     coarse: bool
     states: dict[str, State]
@@ -101,19 +110,22 @@ class Worst:
     ----------
     id : int
         The file's number.
-    angle : float
-        The smallest, in degrees.
+    name : str
+        What it is called, with that number.
+    quality : float
+        The smallest angle in degrees, or the scaled Jacobian where elements are not all simplices.
     measure : float
         Signed area or volume, in model units.
     inverted : bool
     centroid : (2,) or (3,) float64
         In the coordinates of the file.
-    corners : (d+1, d) float64
+    corners : (nodes, d) float64
         As in `State.points`.
     """
 
     id: int
-    angle: float
+    name: str
+    quality: float
     measure: float
     inverted: bool
     centroid: Points
@@ -139,7 +151,7 @@ class Figures:
     Attributes
     ----------
     histograms : dict
-        Counts of smallest angles, in bins of `summary.BIN_WIDTH` degrees, of the first stage and of the last.
+        Counts in the bins of `facts.binned`, of the first stage and of the last.
     convergence : Convergence or None
         None: there were no sweeps.
     worst : list of Worst
@@ -182,11 +194,11 @@ def convergence(records: Sequence[SweepRecord]) -> Convergence:
 
 
 def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArray[np.int64]) -> Scene:
-    """Return the picture of the stages of a mesh; `inverted` and `worst` are rows of its simplices."""
+    """Return the picture of the stages of a mesh; `inverted` and `worst` are rows of its elements."""
     result, mesh = list(meshes.items())[-1]
     boundary, facets, coarse = _coarser(*_boundary(mesh))
     whole = mesh.dimension == 2 and mesh.topology.m <= MOST_CELLS
-    drawn = partial(_whole_state, mesh.topology.number[mesh.topology.simplices]) if whole else _partial_state
+    drawn = partial(_whole_state, _numbered(mesh, np.arange(mesh.topology.m))) if whole else _partial_state
     return Scene(
         boundary=boundary,
         facets=facets,
@@ -199,53 +211,98 @@ def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArr
 
 
 def _worst(report: Report, rows: NDArray[np.int64], inverted_rows: Rows) -> list[Worst]:
-    simplices, inverted = report.mesh.topology.simplices[rows], np.isin(rows, inverted_rows)
-    measures, _ = kernels.measure(report.mesh.points, simplices, 1)
-    angles = np.degrees(kernels.angles(report.mesh.points, simplices, 1)[0])
-    centroids = report.points()[simplices].mean(axis=1, dtype=np.float64)
+    mesh, inverted = report.mesh, np.isin(rows, inverted_rows)
+    judged = Judged(mesh.topology.connectivity, mesh.topology.positions[rows])
+    points = mesh.along_curve(mesh.points)
+    qualities = np.degrees(judged.angles(points, 1))
+    if not mesh.topology.simplicial:
+        qualities = evaluate("scaled_jacobian", mesh)[rows]
+    measures, middles = judged.measures(points, 1), centroids(report, rows)
     return [
         Worst(
             id=int(report.ids[row]),
-            angle=float(angles[i]),
+            name=name,
+            quality=float(qualities[i]),
             measure=float(measures[i]),
             inverted=bool(inverted[i]),
-            centroid=centroids[i],
-            corners=report.mesh.points[simplices[i]],
+            centroid=middles[i],
+            corners=points[judged.vertices(np.array([i])).ravel()],
         )
-        for i, row in enumerate(rows.tolist())
+        for i, (row, name) in enumerate(zip(rows.tolist(), names(report, rows), strict=True))
     ]
 
 
-def _whole_state(cells: Rows, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
-    return State(mesh.along_curve(mesh.points), cells, cells[inverted], cells[worst], left_out=0)
+def number_of(cells: Cells) -> int:
+    """Return how many elements there are."""
+    return sum(map(len, cells.values()))
+
+
+def _numbered(mesh: Mesh, rows: NDArray[np.integer[Any]]) -> dict[str, Rows]:
+    """Return some elements, by the vertices of the connectivity."""
+    cells = {}
+    for block in mesh.topology.blocks:
+        at = np.searchsorted(block.rows, rows)
+        at = at[block.rows.take(at, mode="clip") == rows]
+        cells[block.element.key] = mesh.topology.number[block.vertices[at]]
+    return cells
+
+
+def _whole_state(cells: Cells, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
+    points = mesh.along_curve(mesh.points)
+    return State(points, cells, _numbered(mesh, inverted), _numbered(mesh, worst), left_out=0)
 
 
 def _partial_state(mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
     # Spread, so that what is left out is left out everywhere.
     some = inverted[np.linspace(0, len(inverted) - 1, min(len(inverted), MOST_INVERTED)).astype(np.int64)]
-    points, cells = _compact(mesh.points, mesh.topology.simplices[np.concatenate([some, worst])])
-    none = np.empty((0, mesh.dimension + 1), dtype=np.int32)
-    return State(points, none, cells[: len(some)], cells[len(some) :], left_out=len(inverted) - len(some))
+    groups = [_numbered(mesh, some), _numbered(mesh, worst)]
+    points, (wrong, worst_ones) = _compact(mesh.along_curve(mesh.points), groups)
+    return State(points, {}, wrong, worst_ones, left_out=len(inverted) - len(some))
 
 
-def _compact(points: Points, rows: NDArray[np.integer[Any]]) -> tuple[Points, Rows]:
-    """Return the points that rows (m, c) name, and the rows with the numbers that these have then."""
-    used, numbers = np.unique(rows, return_inverse=True)
-    return points[used], numbers.reshape(rows.shape).astype(np.int32)
+def _compact(points: Points, groups: Sequence[Cells]) -> tuple[Points, list[dict[str, Rows]]]:
+    """Return the points that cells name, and the cells with the numbers that these have then."""
+    named = [rows.ravel() for cells in groups for rows in cells.values()]
+    used, numbers = np.unique(np.concatenate(named), return_inverse=True)
+    parts = iter(np.split(numbers.reshape(-1).astype(np.int32), np.cumsum(list(map(len, named)))[:-1]))
+    return points[used], [{key: next(parts).reshape(rows.shape) for key, rows in cells.items()} for cells in groups]
 
 
-def _boundary(mesh: Mesh) -> tuple[Points, Rows]:
-    """Return the vertices (k, d) and the oriented facets (f, d) of the boundary."""
-    connectivity = mesh.topology.connectivity
-    facets = [
-        connectivity.simplices[connectivity.mates[:, position] < 0][:, corners]
-        for position, corners in enumerate(mesh.topology.element.shape.facets)
-    ]
-    return _compact(mesh.along_curve(mesh.points), np.concatenate(facets))
+def _boundary(mesh: Mesh) -> tuple[Points, dict[str, Rows]]:
+    """Return the vertices (k, d) and the oriented facets of the boundary."""
+    topology, connectivity = mesh.topology, mesh.topology.connectivity
+    facets: dict[str, Rows] = {}
+    if isinstance(topology, MixedTopology):
+        alone = topology.facets[connectivity.facet_mates < 0]
+        size = (alone >= 0).sum(axis=1)
+        for count in np.unique(size).tolist():
+            facets[FACETS[count]] = alone[size == count, :count]
+    else:
+        parts = [
+            connectivity.simplices[connectivity.mates[:, position] < 0][:, corners]
+            for position, corners in enumerate(topology.element.shape.facets)
+        ]
+        facets[FACETS[mesh.dimension]] = np.concatenate(parts)
+    points, (compact,) = _compact(mesh.along_curve(mesh.points), [facets])
+    return points, compact
 
 
-def _coarser(points: Points, facets: Rows) -> tuple[Points, Rows, bool]:
+def _coarser(points: Points, facets: dict[str, Rows]) -> tuple[Points, dict[str, Rows], bool]:
     """Join the vertices in each cell of a grid, as coarse as it takes for `MOST_FACETS`; True: it was needed."""
+    if number_of(facets) <= MOST_FACETS:
+        return points, facets, False
+    halves = np.concatenate([_triangles(rows) for rows in facets.values()])
+    points, (merged,) = _compact(points, [{FACETS[halves.shape[1]]: _merged(points, halves)}])
+    return points, merged, True
+
+
+def _triangles(facets: Rows) -> Rows:
+    """Return facets with those of four vertices cut in two."""
+    return np.concatenate([facets[:, :3], facets[:, [0, 2, 3]]]) if facets.shape[1] == 4 else facets
+
+
+def _merged(points: Points, facets: Rows) -> Rows:
+    """Return facets (f, d) of which each vertex is the first in its cell of the finest grid that is coarse enough."""
     low, size, cells = points.min(axis=0), np.ptp(points, axis=0).max() or 1.0, GRID
     merged: NDArray[np.integer[Any]] = facets
     while len(merged) > MOST_FACETS:
@@ -256,7 +313,7 @@ def _coarser(points: Points, facets: Rows) -> tuple[Points, Rows, bool]:
         _, once = np.unique(_keys(ordered, len(first)), return_index=True)
         merged = first[joined[once[(np.diff(ordered[once], axis=1) > 0).all(axis=1)]]]
         cells = cells * 2 // 3
-    return (*_compact(points, merged), merged is not facets)
+    return merged.astype(np.int32)
 
 
 def _keys(rows: NDArray[np.int64], base: int) -> NDArray[np.int64]:
@@ -264,19 +321,26 @@ def _keys(rows: NDArray[np.int64], base: int) -> NDArray[np.int64]:
     return rows @ base ** np.arange(rows.shape[1], dtype=np.int64)
 
 
-def _creases(points: Points, facets: Rows) -> Rows:
-    """Return the edges (e, 2) of triangles at which two of them meet at an angle, or not two meet."""
-    corners = points[facets]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    normals /= np.where(lengths > 0, lengths, 1)
-    edges = np.sort(facets[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+def _creases(points: Points, facets: Cells) -> Rows:
+    """Return the edges (e, 2) of facets at which two of them meet at an angle, or not two meet."""
+    parts = [_edges_and_normals(points, rows) for rows in facets.values()]
+    edges, normals = (np.concatenate(part) for part in zip(*parts, strict=True))
     order = np.lexsort(edges.T)
-    edges, owner = edges[order], order // 3
+    edges, normals = edges[order], normals[order]
     starts = np.flatnonzero(np.r_[True, (np.diff(edges, axis=0) != 0).any(axis=1)][: len(edges)])
     pairs = np.diff(np.r_[starts, len(edges)]) == 2
     first = starts[pairs]
-    smooth = (normals[owner[first]] * normals[owner[first + 1]]).sum(axis=1) > np.cos(np.radians(CREASE))
+    smooth = (normals[first] * normals[first + 1]).sum(axis=1) > np.cos(np.radians(CREASE))
     sharp = ~pairs
     sharp[np.flatnonzero(pairs)[~smooth]] = True
     return np.ascontiguousarray(edges[starts[sharp]])
+
+
+def _edges_and_normals(points: Points, facets: Rows) -> tuple[Rows, Points]:
+    """Return the edges (e, 2), ascending, of facets (f, 3 or 4), and for each the unit normal (e, 3) of its facet."""
+    corners, size = points[facets], facets.shape[1]
+    normals = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])  # of a quadrilateral's diagonals
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= np.where(lengths > 0, lengths, 1)
+    edges = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2)
+    return np.sort(edges, axis=1), np.repeat(normals, size, axis=0)

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from meshfix_cli.errors import WriteError, on_one_line
-from meshfix_cli.quality.summary import BIN_WIDTH
-from meshfix_cli.report.facts import Report
-from meshfix_cli.report.figures import Convergence, Figures, Points, Scene, State
+from meshfix_cli.report.facts import Binned, Report, binned
+from meshfix_cli.report.figures import Cells, Convergence, Figures, Points, Scene, State, number_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +34,7 @@ STYLE: dict[Any, Any] = {  # names of matplotlib's settings
 }
 RED, AMBER, BLUE = "#c2361a", "#f0a500", "#1d6aa8"  # told apart by all eyes, and in grey
 WIDTH, ROW, DPI = 7.2, 2.3, 300  # inches, inches, dots per inch
-MOST_LINES = 5_000  # triangles: the lines of more are pixels in .svg and .pdf as well
+MOST_LINES = 5_000  # elements: the lines of more are pixels in .svg and .pdf as well
 
 
 def check_plot(target: str) -> None:
@@ -89,16 +88,14 @@ def _figure(report: Report, drawn: Figures) -> Figure:
             bands[0].subplots(1, pictures, squeeze=False)[0], drawn.scene.states.items(), strict=True
         ):
             _picture(axes, drawn.scene, state)
-            count = len(state.worst)
+            count = number_of(state.worst)
             amber = f", amber: the worst {count if count > 1 else 'one'}" if count else ""
             axes.set_title(f"{name}: {state.count:,} inverted{amber}")
     axes = bands[-1].subplots(1, charts, squeeze=False)[0]
-    shape = report.mesh.topology.element.shape
-    angle, measure = shape.angle, shape.measure
-    _histogram(axes[0], drawn.histograms, angle)
+    _histogram(axes[0], drawn.histograms, binned(report.mesh))
     if drawn.convergence is not None:
         _inverted(axes[1], drawn.convergence)
-        _measures(axes[2], drawn.convergence, measure)
+        _measures(axes[2], drawn.convergence, report.mesh.topology.element.shape.measure)
     return figure
 
 
@@ -113,21 +110,28 @@ def _picture(axes: Axes, scene: Scene, state: State) -> None:
 
     middle, extent = scene.frame
     roles = (state.cells, "none", "0.25"), (state.worst, AMBER, "k"), (state.inverted, f"{RED}8c", RED)
-    for rows, face, line in roles:
-        many = len(rows) > MOST_LINES
-        cells = PolyCollection(
-            list(state.points[rows]), facecolors=face, edgecolors=line, linewidths=0.1 if many else 0.3, rasterized=many
-        )
-        axes.add_collection(cells, autolim=False)
-    axes.add_collection(LineCollection(list(scene.boundary[scene.facets]), colors="k", linewidths=0.8), autolim=False)
+    for cells, face, line in roles:
+        many = number_of(cells) > MOST_LINES
+        polygons = PolyCollection(
+            _places(state.points, cells), facecolors=face, edgecolors=line, linewidths=0.1 if many else 0.3,
+            rasterized=many,
+        )  # fmt: skip
+        axes.add_collection(polygons, autolim=False)
+    lines = LineCollection(_places(scene.boundary, scene.facets), colors="k", linewidths=0.8)
+    axes.add_collection(lines, autolim=False)
     low, high = _window(middle, extent, state)
     axes.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.axis("off")
 
 
+def _places(points: Points, cells: Cells) -> list[Points]:
+    """Return where the vertices (nodes, d) of each element are."""
+    return [corners for rows in cells.values() for corners in points[rows]]
+
+
 def _window(middle: Points, extent: Points, state: State) -> tuple[Points, Points]:
     """Return the corners of what is shown: also what is inverted beyond the boundary, but for what is far away."""
-    inverted = state.points[state.inverted.ravel()]
+    inverted = np.concatenate([*_places(state.points, state.inverted), np.empty((0, 2))])
     low, high = (
         choose(limit, choose.reduce(inverted, axis=0)) if len(inverted) else limit
         for choose, limit in ((np.minimum, middle - extent), (np.maximum, middle + extent))
@@ -138,14 +142,14 @@ def _window(middle: Points, extent: Points, state: State) -> tuple[Points, Point
     )
 
 
-def _histogram(axes: Axes, histograms: dict[str, tuple[int, ...]], angle: str) -> None:
+def _histogram(axes: Axes, histograms: dict[str, tuple[int, ...]], counted: Binned) -> None:
     names, bins = list(histograms), len(next(iter(histograms.values())))
-    edges = [i * BIN_WIDTH for i in range(bins + 1)]
+    edges = [i * counted.width for i in range(bins + 1)]
     axes.stairs(histograms[names[-1]], edges, fill=True, color=BLUE, alpha=0.6, label=names[-1])
     if len(names) > 1:
         axes.stairs(histograms[names[0]], edges, color=RED, linewidth=1.0, label=names[0])
         _legend(axes)
-    axes.set(xlim=(0, edges[-1]), xlabel=f"smallest {angle} [°]", ylabel="elements")
+    axes.set(xlim=(0, edges[-1]), xlabel=counted.label, ylabel="elements")
 
 
 def _inverted(axes: Axes, convergence: Convergence) -> None:

@@ -14,13 +14,14 @@ from rich.text import Text
 
 from meshfix_cli.mesh.elements import MEASURES, counted, words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.quality.summary import BIN_WIDTH
 from meshfix_cli.report.as_json import to_json
 from meshfix_cli.report.facts import (
     STATUSES,
     Report,
     Tally,
     before_and_after,
+    binned,
+    kind_rows,
     phases,
     processes,
     quality_rows,
@@ -49,10 +50,16 @@ class _Console(Console):
         raise BrokenPipeError
 
 
-def print_report(report: Report, out: Console) -> None:
-    """Print the quality table, the phases, the notes and a verdict in plain words."""
+def print_report(report: Report, out: Console, by_type: bool = False) -> None:
+    """Print the quality table, the phases, the notes and a verdict in plain words.
+
+    With `by_type`, a table of each of several types of elements follows the first.
+    """
     _line(out, title(report))
     _print_table(out, list(report.stages), _rows(report))
+    types, rows = kind_rows(report)
+    if by_type and types:
+        _print_table(out, types, rows)
     for text in phases(report):
         _line(out, text)
     for rank, text in enumerate(processes(report)):
@@ -92,6 +99,7 @@ def print_tally(tally: Tally, seconds: float, out: Console) -> None:
         return
     counts = [(label, ["", f"{tally.statuses[status]:,}"]) for status, label in STATUSES.items()]
     angles = [f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle]
+    jacobians = [f"{value:.3f}" if math.isfinite(value) else "" for value in tally.jacobian]
     rows = [
         ("files", ["", f"{files:,}"]),
         *counts,
@@ -99,6 +107,8 @@ def print_tally(tally: Tally, seconds: float, out: Console) -> None:
         ("inverted elements", [f"{count:,}" for count in tally.inverted]),
         ("smallest angle of all [°]", angles),
     ]
+    if any(jacobians):
+        rows.append(("smallest scaled Jacobian of all", jacobians))
     _print_table(out, ["before", "after"], rows)
     _line(out, f"{seconds:.3g} s, {files / max(seconds, 1e-9):,.2f} files a second")
 
@@ -147,7 +157,7 @@ def _result_line(result: Mapping[str, Any]) -> str:
     parts = [f"{result['file']}: {STATUSES[result['status']]}"]
     if before and after:
         parts.append(f"{before['inverted']:,} inverted -> {after['inverted']:,}")
-        parts.append(f"smallest angle {before['min_angle']:.3f}° -> {after['min_angle']:.3f}°")
+        parts.append(_better(before, after))
     parts += [f"NOT MET: {one['requirement']}" for one in result["requirements"] if not one["met"]]
     if result["misnumbered"]:
         parts.append(f"{result['misnumbered']:,} numbered against the rest of the mesh")
@@ -161,11 +171,19 @@ def _result_line(result: Mapping[str, Any]) -> str:
     return ", ".join([*parts, f"{result['seconds']:.3g} s"])
 
 
+def _better(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
+    if "scaled_jacobian" in after:
+        old, new = (one["scaled_jacobian"]["smallest"] for one in (before, after))
+        return f"smallest scaled Jacobian {old:.3f} -> {new:.3f}"
+    return f"smallest angle {before['min_angle']:.3f}° -> {after['min_angle']:.3f}°"
+
+
 def _rows(report: Report) -> list[tuple[str, list[str]]]:
     """Return the rows of the quality table, and one of histograms."""
     bars = [_bars(summary.histogram) for summary in report.stages.values()]
-    width = len(report.result.histogram) * BIN_WIDTH
-    return [*quality_rows(report), (f"smallest angles, 0 to {width:.0f}°", bars)]
+    bins = binned(report.mesh)
+    width = len(report.result.histogram) * bins.width
+    return [*quality_rows(report), (f"{bins.name}s, 0 to {width:.0f}{bins.unit}", bars)]
 
 
 def _print_table(out: Console, columns: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> None:

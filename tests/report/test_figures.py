@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from elements import MESHES
 from meshes import tangle
 from numpy.typing import NDArray
+from reports import FIRST, built, report_on, tangled
+from sampling import jacobians, measure
+from verdict import vtk_quality
 
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise, worst_first
 from meshfix_cli.report import figures
-from meshfix_cli.report.figures import Scene, convergence, scene
+from meshfix_cli.report.figures import Cells, Scene, convergence, number_of, scene
 from meshfix_cli.solve.untangle import untangle
 
 FACTORIAL = {2: 2, 3: 6}
@@ -22,9 +26,24 @@ def drawn(mesh: Mesh) -> Scene:
     return scene({"mesh": mesh}, {"mesh": summary.inverted_elements}, worst_first(mesh, summary.inverted_elements, 10))
 
 
-def enclosed(points: NDArray[np.float64], facets: NDArray[np.int32]) -> float:
-    """Area or volume within oriented facets."""
-    return float(np.linalg.det(points[facets]).sum() / FACTORIAL[points.shape[1]])
+def enclosed(points: NDArray[np.float64], facets: Cells) -> float:
+    """Area or volume within oriented facets; a quadrilateral is between its halves by one diagonal and the other."""
+    total = 0.0
+    for key, rows in facets.items():
+        halves = np.concatenate([rows[:, np.roll(range(4), -k)[:3]] for k in range(4)]) if key == "quad" else rows
+        share = 0.5 if key == "quad" else 1.0
+        total += share * float(np.linalg.det(points[halves]).sum() / FACTORIAL[points.shape[1]])
+    return total
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_the_boundary_encloses_elements_of_every_type(name: str) -> None:
+    points, cells = MESHES[name]()
+    picture = drawn(built(name))
+    assert enclosed(picture.boundary, picture.facets) == pytest.approx(
+        sum(measure(points, key, rows) for key, rows in cells)
+    )
+    assert set(picture.facets) <= ({"line"} if points.shape[1] == 2 else {"triangle", "quad"})
 
 
 def test_the_boundary_encloses_the_mesh(mesh: Mesh) -> None:
@@ -40,9 +59,27 @@ def test_a_boundary_of_many_facets_is_drawn_coarsely(bracket: Mesh, monkeypatch:
     monkeypatch.setattr(figures, "MOST_FACETS", 900)
     coarse = drawn(bracket)
     assert coarse.coarse
-    assert 100 < len(coarse.facets) <= 900 < len(fine.facets)
+    assert 100 < number_of(coarse.facets) <= 900 < number_of(fine.facets)
     size = np.ptp(fine.boundary, axis=0)
     np.testing.assert_allclose(np.ptp(coarse.boundary, axis=0), size, atol=0.1 * size.max())
+
+
+def test_a_boundary_of_many_quadrilaterals_is_drawn_coarsely(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(figures, "MOST_FACETS", 900)
+    coarse = drawn(built("hex bracket"))
+    assert coarse.coarse
+    assert list(coarse.facets) == ["triangle"]
+    assert 100 < number_of(coarse.facets) <= 900
+    points, ((key, rows),) = MESHES["hex bracket"]()
+    whole = measure(points, key, rows)
+    assert enclosed(coarse.boundary, coarse.facets) == pytest.approx(whole, rel=0.2)
+
+
+@pytest.mark.parametrize("name", ["hex box", "wedges and tets", "tets within hexes"])
+def test_creases_of_a_cube_of_elements_of_any_type(name: str) -> None:
+    picture = drawn(built(name))
+    lengths = np.linalg.norm(np.diff(picture.boundary[picture.creases], axis=1), axis=2)
+    assert lengths.sum() == pytest.approx(12)
 
 
 def test_creases_of_a_cube() -> None:
@@ -57,15 +94,53 @@ def test_creases_of_a_cube() -> None:
 
 
 def test_inverted_elements_are_drawn_where_they_are(mesh: Mesh, monkeypatch: pytest.MonkeyPatch) -> None:
-    tangled = tangle(mesh)
-    state = drawn(tangled).states["mesh"]
-    corners = state.points[state.inverted]
+    moved = tangle(mesh)
+    state = drawn(moved).states["mesh"]
+    (inverted,) = state.inverted.values()
+    corners = state.points[inverted]
     assert (np.linalg.det(corners[:, 1:] - corners[:, :1]) <= 1e-12).all()
-    assert (len(state.inverted), state.left_out) == (tangled.check()[0], 0)
+    assert (state.drawn, state.left_out) == (moved.check()[0], 0)
     monkeypatch.setattr(figures, "MOST_INVERTED", 7)
     monkeypatch.setattr(figures, "MOST_CELLS", 0)
-    state = drawn(tangled).states["mesh"]
-    assert (len(state.cells), len(state.inverted), state.left_out) == (0, 7, tangled.check()[0] - 7)
+    state = drawn(moved).states["mesh"]
+    assert (number_of(state.cells), state.drawn, state.left_out) == (0, 7, moved.check()[0] - 7)
+
+
+@pytest.mark.parametrize("name", ["every solid", "quads and triangles"])
+def test_inverted_elements_of_every_type_are_drawn_where_they_are(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = tangled(name)
+    state, cells = drawn(mesh).states["mesh"], dict(MESHES[name]()[1])
+    expected = mesh.check()[0]
+    assert (state.drawn, state.left_out) == (expected, 0)
+    assert number_of(state.cells) == (mesh.topology.m if mesh.dimension == 2 else 0)
+    for key, rows in state.inverted.items():
+        smallest = jacobians(mesh.points, key, cells[key], 8).min(axis=1)
+        found = {tuple(map(tuple, corners)) for corners in state.points[rows].tolist()}
+        assert {tuple(map(tuple, corners)) for corners in mesh.points[cells[key][smallest < 0]].tolist()} <= found
+    monkeypatch.setattr(figures, "MOST_INVERTED", 50)
+    monkeypatch.setattr(figures, "MOST_CELLS", 0)
+    state = drawn(mesh).states["mesh"]
+    assert (number_of(state.cells), state.drawn, state.left_out) == (0, 50, expected - 50)
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_the_worst_elements_have_the_smallest_scaled_jacobians(name: str) -> None:
+    mesh = built(name)
+    values = np.empty(mesh.topology.m)
+    for block in mesh.topology.blocks:
+        values[block.rows] = vtk_quality("scaled_jacobian", block.element, mesh.points[block.vertices])
+    worst = figures.figures(report_on(mesh)).worst
+    np.testing.assert_allclose([one.quality for one in worst], np.sort(values)[:10], atol=1e-12)
+    for one in worst:
+        row = one.id - FIRST
+        (block,) = (block for block in mesh.topology.blocks if row in block.rows)
+        nodes = mesh.points[block.vertices[np.searchsorted(block.rows, row)]]
+        assert one.name == f"{block.element.shape.name} {one.id}"
+        np.testing.assert_array_equal(one.corners, nodes)
+        np.testing.assert_allclose(one.centroid, nodes.mean(axis=0), atol=1e-12)
+        assert values[row] == pytest.approx(one.quality, abs=1e-12)
+        alone = np.arange(len(nodes), dtype=np.int32)[None]
+        assert one.measure == pytest.approx(measure(nodes, block.element.key, alone))
 
 
 def test_the_worst_are_the_inverted_then_the_smallest_angles(mesh: Mesh) -> None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from hashlib import sha256
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
+from itertools import pairwise
 from pathlib import Path, PurePath
 from string import Template
 from typing import Any
@@ -17,11 +18,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import SIMPLICES, counted
-from meshfix_cli.quality.summary import BIN_WIDTH
+from meshfix_cli.mesh.elements import ELEMENTS, Shape, counted
 from meshfix_cli.report.as_json import to_json
-from meshfix_cli.report.facts import Report, phases, processes, quality_rows, required, title, verdict
-from meshfix_cli.report.figures import Figures, Scene, Worst
+from meshfix_cli.report.facts import (
+    Report,
+    binned,
+    is_some_inside,
+    kind_rows,
+    phases,
+    processes,
+    quality_rows,
+    required,
+    title,
+    verdict,
+)
+from meshfix_cli.report.figures import Cells, Figures, Scene, Worst, number_of
 from meshfix_cli.report.page import charts
 from meshfix_cli.report.plain import plain
 
@@ -58,12 +69,13 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
         outcome="valid" if report.valid else "wrong",
         verdict=_verdict(report),
         lead=_lead(report),
-        picture=_shown(_in_words(drawn.scene)),
+        picture=_shown(_in_words(report, drawn.scene)),
         stages=_stages(drawn.scene),
         legend=_legend(report, drawn.scene),
         keys=_keys(drawn.scene.dimension),
-        quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)),
+        quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)) + _by_type(report),
         requirements=_requirements(report),
+        charted="Angles" if report.mesh.topology.simplicial else "Scaled Jacobians",
         and_convergence=" and convergence" if drawn.convergence else "",
         charts=_charts(report, drawn),
         worst=_worst(report, drawn),
@@ -116,16 +128,21 @@ def _verdict(report: Report) -> str:
 def _lead(report: Report) -> str:
     """Return the numbers that matter most, of the result and of the mesh as it came."""
     boxes = ""
-    for name, values in quality_rows(report)[:4]:
+    for name, values in quality_rows(report)[: 4 + is_some_inside(report)]:
         was = f' <span class="was">from {_shown(values[0])}</span>' if len(values) > 1 else ""
         boxes += f"<div><dt>{_shown(name)}</dt><dd>{_shown(values[-1])}{was}</dd></div>"
     return f'<dl class="lead">{boxes}</dl>'
 
 
-def _in_words(scene: Scene) -> str:
+def _by_type(report: Report) -> str:
+    types, rows = kind_rows(report)
+    return _table(f"The {_result(report)} by types of elements", ["", *types], rows) if types else ""
+
+
+def _in_words(report: Report, scene: Scene) -> str:
     counts = ", ".join(f"{state.count:,} inverted {stage}" for stage, state in scene.states.items())
     what = "Plane view" if scene.dimension == 2 else "Three-dimensional view"
-    return f"{what} of the mesh and its {SIMPLICES[scene.dimension].shape.plural}: {counts}"
+    return f"{what} of the mesh and its {report.mesh.topology.element.shape.plural}: {counts}"
 
 
 def _stages(scene: Scene) -> str:
@@ -133,7 +150,7 @@ def _stages(scene: Scene) -> str:
     for i, (name, state) in enumerate(scene.states.items()):
         words = f"{name}: {counted(state.count, 'inverted element', 'inverted elements')}"
         if state.left_out:
-            words += f", of which {counted(len(state.inverted), 'is', 'are')} drawn"
+            words += f", of which {counted(state.drawn, 'is', 'are')} drawn"
         radios += (
             f'<label><input type="radio" name="stage" value="{i}" data-drawn="{_shown(words)}"'
             f"{' checked' * (i == 0)}>{_shown(name)}</label>"
@@ -143,9 +160,9 @@ def _stages(scene: Scene) -> str:
 
 def _legend(report: Report, scene: Scene) -> str:
     boundary = "boundary, drawn coarsely" if scene.coarse else "boundary"
-    if scene.dimension == 2 and any(len(state.cells) for state in scene.states.values()):
+    if scene.dimension == 2 and any(state.cells for state in scene.states.values()):
         boundary = "all elements"
-    count = len(list(scene.states.values())[-1].worst)
+    count = number_of(list(scene.states.values())[-1].worst)
     worst = f"the worst {count}" if count > 1 else "the worst one"
     items = {"inverted": "inverted elements", "worst": f"{worst} of the {_result(report)}", "boundary": boundary}
     return "\n".join(f'<li><i class="{style}"></i>{words}</li>' for style, words in items.items())
@@ -167,15 +184,14 @@ def _requirements(report: Report) -> str:
 
 
 def _charts(report: Report, drawn: Figures) -> str:
-    shape = report.mesh.topology.element.shape
-    angle, measure = shape.angle, shape.measure
-    bins = len(report.result.histogram)
+    bins, measure = binned(report.mesh), report.mesh.topology.element.shape.measure
+    edges = [f"{i * bins.width:g}" for i in range(len(report.result.histogram) + 1)]
     counts = [
-        (f"{i * BIN_WIDTH:.0f}–{(i + 1) * BIN_WIDTH:.0f}°", [f"{one[i]:,}" for one in drawn.histograms.values()])
-        for i in range(bins)
+        (f"{low}–{high}{bins.unit}", [f"{one[i]:,}" for one in drawn.histograms.values()])
+        for i, (low, high) in enumerate(pairwise(edges))
     ]
-    numbers = _table("Elements by their smallest angle", ["smallest angle", *drawn.histograms], counts)
-    result = _figure(f"Elements by their smallest {angle}", charts.histogram(drawn.histograms, angle), numbers)
+    numbers = _table(f"Elements by their {bins.name}", [bins.name, *drawn.histograms], counts)
+    result = _figure(f"Elements by their {bins.long_name}", charts.histogram(drawn.histograms, bins), numbers)
     if drawn.convergence is None:
         return result
     result += _figure("Inverted elements, logarithmic", charts.inverted(drawn.convergence), _sweeps(report, measure))
@@ -197,9 +213,7 @@ def _sweeps(report: Report, measure: str) -> str:
 
 
 def _worst(report: Report, drawn: Figures) -> str:
-    shape = report.mesh.topology.element.shape
-    angle, measure = shape.angle, shape.measure
-    columns = [f"smallest {angle} [°]", measure, "inverted", "centroid"]
+    columns = [binned(report.mesh).label, report.mesh.topology.element.shape.measure, "inverted", "centroid"]
     head = "".join(f'<th scope="col">{column}</th>' for column in ("element", "picture", *columns))
     body = "".join(_worst_row(one, columns, drawn.scene) for one in drawn.worst)
     count = f"{len(drawn.worst)} worst elements" if len(drawn.worst) > 1 else "worst element"
@@ -213,15 +227,15 @@ def _worst_row(one: Worst, columns: Sequence[str], scene: Scene) -> str:
     reach = np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()
     place = [*corners.mean(axis=0), *[0.0] * (3 - scene.dimension), max(float(reach), 1e-6)]
     centroid = f"({', '.join(f'{x:.6g}' for x in one.centroid)})"
-    values = f"{one.angle:.3f}", f"{one.measure:.3g}", "yes" if one.inverted else "no", centroid
+    values = f"{one.quality:.3f}", f"{one.measure:.3g}", "yes" if one.inverted else "no", centroid
     styles = "", "", "inverted" * one.inverted, ""
     cells = "".join(
         f'<td data-column="{column}" class="{style}">{value}</td>'
         for column, style, value in zip(columns, styles, values, strict=True)
     )
-    data = f'data-element="{one.id}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
-    button = f'<button type="button" hidden {data} aria-label="Show element {one.id}">Show</button>'
-    return f'<tr><th scope="row">{one.id}</th><td>{button}</td>{cells}</tr>'
+    data = f'data-element="{one.name}" data-place="{" ".join(f"{x:.6g}" for x in place)}"'
+    button = f'<button type="button" hidden {data} aria-label="Show {one.name}">Show</button>'
+    return f'<tr><th scope="row">{one.name.removeprefix("element ")}</th><td>{button}</td>{cells}</tr>'
 
 
 def _result(report: Report) -> str:
@@ -254,21 +268,23 @@ def _placed(points: Numbers, scene: Scene) -> NDArray[np.float32]:
 def _scene(scene: Scene) -> dict[str, Any]:
     """Return what the page's script draws.
 
-    `points` are base64 of float32, `rows` of uint16 or, where wide, of uint32; layers name both by their place there.
+    `points` are base64 of float32, `rows` of uint16 or, where wide, of uint32; layers name both by their place there,
+    and `shapes` have the polygons that make the surface of an element.
     """
     points, extent = [scene.boundary], scene.frame[1]
     layers: list[dict[str, Any]] = []
     # One array, such as that of all cells, may be drawn in several stages.
     rows: dict[int, NDArray[np.int32]] = {}
 
-    def add(role: str, corners: NDArray[np.int32], stage: int | None = None) -> None:
-        if len(corners):
-            rows.setdefault(id(corners), corners)
-            place = {"points": len(points) - 1, "rows": list(rows).index(id(corners))}
-            layers.append({"role": role, "corners": corners.shape[1], "stage": stage, **place})
+    def add(role: str, cells: Cells, stage: int | None = None) -> None:
+        for key, corners in cells.items():
+            if len(corners):
+                rows.setdefault(id(corners), corners)
+                place = {"points": len(points) - 1, "rows": list(rows).index(id(corners))}
+                layers.append({"role": role, "shape": key, "stage": stage, **place})
 
     add("boundary", scene.facets)
-    add("creases", scene.creases)
+    add("creases", {"line": scene.creases})
     for stage, state in enumerate(scene.states.values()):
         points.append(state.points)
         add("cells", state.cells, stage)
@@ -279,8 +295,15 @@ def _scene(scene: Scene) -> dict[str, Any]:
         "extent": (extent / np.linalg.norm(extent)).tolist(),
         "points": [_base64(_placed(one, scene)) for one in points],
         "rows": [_numbered(one) for one in rows.values()],
+        "shapes": {layer["shape"]: _surface(ELEMENTS[layer["shape"]].shape) for layer in layers},
         "layers": layers,
     }
+
+
+def _surface(shape: Shape) -> dict[str, Any]:
+    """Return the number of corners, and the corners of each polygon."""
+    flat = [list(range(shape.corners))]
+    return {"corners": shape.corners, "sides": list(shape.facets) if shape.dimension == 3 else flat}
 
 
 def _numbered(rows: NDArray[np.int32]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
 
-from meshfix_cli.quality.summary import BIN_WIDTH
+from meshfix_cli.report.facts import Binned
 from meshfix_cli.report.figures import Convergence
 
 WIDTH, HEIGHT = 340, 250
@@ -17,15 +17,15 @@ MOST_DECADES = 6  # that are labelled
 _SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
 
 
-def histogram(counts: Mapping[str, Sequence[int]], angle: str) -> str:
-    """Return the histogram of the smallest angles of one stage or two: the last in bars, one before as an outline.
+def histogram(counts: Mapping[str, Sequence[int]], binned: Binned) -> str:
+    """Return the histogram of one stage or two: the last in bars, one before as an outline.
 
     Parameters
     ----------
     counts : mapping
-        Of each stage, in bins of `summary.BIN_WIDTH` degrees.
-    angle : str
-        What they are the smallest of.
+        Of each stage.
+    binned : Binned
+        What is counted.
     """
     names, bins = list(counts), len(next(iter(counts.values())))
     largest = max(map(max, counts.values()))
@@ -46,13 +46,13 @@ def histogram(counts: Mapping[str, Sequence[int]], angle: str) -> str:
         steps = "".join(f"V{y(count):.1f}H{LEFT + (i + 1) * width:.1f}" for i, count in enumerate(counts[names[0]]))
         outline = f'<path class="before" d="M{LEFT},{BOTTOM}{steps}V{BOTTOM}"/>'
     ticks = [(y(value), f"{value:,.0f}") for value in _multiples(step, top)]
-    degrees = [(LEFT + i * width, f"{i * BIN_WIDTH:.0f}") for i in range(0, bins + 1, 3)]
+    values = [(LEFT + i * width, f"{i * binned.width:g}") for i in range(0, bins + 1, max(3, bins // 5))]
     keys = [("after", names[-1])] + ([("before", names[0])] if len(names) > 1 else [])
-    body = _rows(ticks) + bars + outline + _columns(degrees, f"smallest {angle} [°]") + _keys(keys)
-    words = f"Number of elements by their smallest {angle}: " + "; ".join(
+    body = _rows(ticks) + bars + outline + _columns(values, binned.label) + _keys(keys)
+    words = f"Number of elements by their {binned.long_name}: " + "; ".join(
         f"{name}, {', '.join(map(str, one))}" for name, one in counts.items()
     )
-    return _svg("histogram", f"Smallest {angle}s", words, body)
+    return _svg("histogram", binned.heading, words, body)
 
 
 def inverted(convergence: Convergence) -> str:

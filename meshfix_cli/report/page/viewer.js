@@ -1,5 +1,5 @@
 "use strict";
-// Draws the scene: triangles, tetrahedra and edges with an orthographic camera that turns around a point.
+// Draws the scene: elements, their facets and edges with an orthographic camera that turns around a point.
 (() => {
   const FILL = `#version 300 es
     uniform mat4 camera;
@@ -63,7 +63,7 @@
     out vec4 pixel;
     void main() { pixel = vec4(colour.rgb * colour.a, colour.a); }`;
 
-  const MOST_OUTLINED = 5000; // tetrahedra: the edges of more would hide their colour
+  const MOST_OUTLINED = 5000; // solids: the edges of more would hide their colour
   const MOST_EDGES = 30000; // of a boundary in space, for the same reason
   const STEP = Math.PI / 24;
   const NEAREST = 1e5;
@@ -94,7 +94,8 @@
     return result;
   }
 
-  // Corners in pairs or triples; `once` takes one of the two directions in which the edges of an oriented surface occur.
+  // Corners in pairs or triples of all elements; `once` takes one of the two directions in which the edges of an
+  // oriented surface occur.
   function picked(rows, corners, groups, once = false) {
     const result = [];
     for (let i = 0; i < rows.length; i += corners)
@@ -103,14 +104,24 @@
     return result;
   }
 
-  const SIDES = { 2: [], 3: [[0, 1, 2]], 4: [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]] };
-  const EDGES = { 2: [[0, 1]], 3: [[0, 1], [1, 2], [2, 0]], 4: [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]] };
+  // The triangles of an element's sides.
+  function halves({ sides }) {
+    return sides.flatMap((side) => side.slice(2).map((corner, i) => [side[0], side[i + 1], corner]));
+  }
+
+  // Pairs of corners: of a solid each edge once, of a polygon or a line as its sides go round.
+  function edges({ sides }) {
+    const around = sides.flatMap((side) => side.map((corner, i) => [corner, side[(i + 1) % side.length]]));
+    if (sides.length > 1) return around.filter(([a, b]) => a < b);
+    return sides[0].length > 2 ? around : around.slice(0, 1);
+  }
 
   function edgesOf(layer, rows) {
-    const { role, corners } = layer, count = rows.length / corners;
-    if (role === "boundary" && !flat && count * 1.5 > MOST_EDGES) return [];
-    if (corners === 4 && count > MOST_OUTLINED) return [];
-    return picked(rows, corners, EDGES[corners], role === "cells" || (role === "boundary" && corners === 3));
+    const { role } = layer, shape = scene.shapes[layer.shape], count = rows.length / shape.corners;
+    const shared = role === "cells" || (role === "boundary" && shape.corners > 2);
+    if (role === "boundary" && !flat && count * shape.corners / 2 > MOST_EDGES) return [];
+    if (shape.sides.length > 1 && count > MOST_OUTLINED) return [];
+    return picked(rows, shape.corners, edges(shape), shared);
   }
 
   // What the graphics card is given.
@@ -186,11 +197,12 @@
     return scene.layers.map((layer) => {
       const { wide, data } = scene.rows[layer.rows];
       const rows = new (wide ? Uint32Array : Uint16Array)(decoded(data)), here = coordinates[layer.points];
+      const shape = scene.shapes[layer.shape];
       return {
         ...layer,
-        fill: filled(buffers[layer.points], picked(rows, layer.corners, SIDES[layer.corners])),
+        fill: filled(buffers[layer.points], picked(rows, shape.corners, halves(shape))),
         lines: outlined(here, edgesOf(layer, rows)),
-        rings: layer.role === "worst" ? ringed(here, rows, layer.corners) : { count: 0 },
+        rings: layer.role === "worst" ? ringed(here, rows, shape.corners) : { count: 0 },
       };
     });
   }
@@ -401,7 +413,7 @@
     const [x, y, z, reach] = button.dataset.place.split(" ").map(Number);
     view.centre = [x, y, z];
     view.zoom = within(0.25 / reach);
-    choose(radios[radios.length - 1], `; in the middle element ${button.dataset.element}`);
+    choose(radios[radios.length - 1], `; in the middle ${button.dataset.element}`);
     canvas.scrollIntoView({ block: "center" });
     canvas.focus({ preventScroll: true });
   }

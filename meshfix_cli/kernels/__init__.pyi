@@ -201,16 +201,16 @@ def linear_program(
 def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
     """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
 
+def crossings_and_folds(points: Float64, facets: Int32, shared: Uint8, threads: int) -> tuple[Int32, Int32]:
+    """Pairs that cross, and pairs (b, 2) of oriented facets that lie upon each other, their insides on the same side.
+
+    Those that are `shared` (f,) have their insides on both sides.
+    """
+
 def embedding(points: Float64, mesh: Connectivity, free: NDArray[np.bool_], weights: Float64, threads: int) -> Float64:
     """Return the points (n, d) with each free one (n,) at the mean of its neighbours; needs the stars.
 
     There is a weight for each of `mesh.neighbours`; (0,): all are the same.
-    """
-
-def folds(points: Float64, facets: Int32, shared: Uint8, threads: int) -> Int32:
-    """Pairs (k, 2) of oriented facets (f, d) that lie upon each other, their insides on the same side.
-
-    Those that are `shared` (f,) have their insides on both sides.
     """
 
 def enclosing(points: Float64, facets: Int32, parts: Int32, places: Float64, own: Int32, threads: int) -> Int32:

@@ -116,7 +116,7 @@ def _meeting(
     found = []
     for other_diagonal in (False,) if mesh.topology.simplicial else (False, True):
         facets, owners, shared = connectivity.fixed_facets(movable, threads, other_diagonal)
-        pairs = kernels.crossings(points, facets, threads), kernels.folds(points, facets, shared, threads)
+        pairs = kernels.crossings_and_folds(points, facets, shared, threads)
         found.append([_in_one_part(mesh, owners[some]) for some in pairs])
     crossing, folding = found[0]
     for others in found[1:]:

@@ -131,5 +131,5 @@ def test_facets_of_two_simplices_have_their_insides_on_both_sides() -> None:
         ([(0, 2), (1, 3)], (1, 1), 0),
         ([(0, 2), (2, 1)], (1, 1), 0),
     ):
-        pairs = kernels.folds(points, np.array(facets, dtype=np.int32), np.array(shared, dtype=np.uint8), 1)
-        assert len(pairs) == found
+        facets_of, sides = np.array(facets, dtype=np.int32), np.array(shared, dtype=np.uint8)
+        assert len(kernels.crossings_and_folds(points, facets_of, sides, 1)[1]) == found

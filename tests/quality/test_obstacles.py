@@ -113,6 +113,45 @@ def test_crossings_against_brute_force(random: np.random.Generator, d: int) -> N
         assert kernels.crossings(points, facets, 3).tolist() == kernels.crossings(points, facets, 1).tolist()
 
 
+def side(*corners: NDArray[np.int64]) -> int:
+    """Sign of the determinant of d+1 places of a small lattice."""
+    return int(np.sign(np.rint(np.linalg.det(np.array(corners[1:]) - corners[0]))))
+
+
+def goes_through(segment: NDArray[np.int64], facet: NDArray[np.int64]) -> bool:
+    """Whether a segment (2, d) meets the inside of a facet (d, d) between its ends."""
+    p, q = segment
+    if side(p, *facet) * side(q, *facet) >= 0:
+        return False
+    sides = {side(p, q, *np.delete(facet, k, axis=0)) * (-1) ** k for k in range(3)} if len(facet) == 3 else set()
+    return (len(facet) == 2 and side(facet[0], p, q) * side(facet[1], p, q) < 0) or sides in ({1}, {-1})
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_crossings_of_facets_that_touch(random: np.random.Generator, d: int) -> None:
+    """On a small lattice many have corners, edges and planes in common, and boxes that only touch."""
+    crossing = touching = 0
+    for _ in range(4):
+        corners = random.integers(0, 4, (25, d, d))
+        facets = np.arange(25 * d, dtype=np.int32).reshape(25, d)
+        expected = {
+            (a, b)
+            for (a, one), (b, other) in combinations(enumerate(corners), 2)
+            if any(
+                goes_through(x[list(edge)], y)
+                for x, y in ((one, other), (other, one))
+                for edge in combinations(range(d), 2)
+            )
+        }
+        found = kernels.crossings(corners.reshape(-1, d).astype(float), facets, 1)
+        assert {tuple(sorted(pair)) for pair in found.tolist()} == expected
+        low, high = corners.min(axis=1), corners.max(axis=1)
+        least = (np.minimum(high[:, None], high) - np.maximum(low[:, None], low)).min(axis=2)
+        crossing, touching = crossing + len(expected), touching + int((least == 0).sum())
+    assert crossing > 20
+    assert touching > 20
+
+
 def test_no_facets_no_crossings() -> None:
     assert kernels.crossings(np.zeros((3, 2)), np.zeros((0, 2), dtype=np.int32), 2).shape == (0, 2)
 

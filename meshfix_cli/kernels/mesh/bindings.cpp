@@ -192,13 +192,14 @@ auto crossings_py(const Matrix<const double>& points, const Matrix<const std::in
     return to_numpy(std::move(pairs), 2);
 }
 
-auto folds_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
-              const Vector<const std::uint8_t>& shared, int threads) {
+auto crossings_and_folds_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
+                            const Vector<const std::uint8_t>& shared, int threads) {
     const auto count = static_cast<std::int64_t>(facets.shape(0));
-    std::vector<std::int32_t> pairs = with_dimension(points.shape(1), [&](auto d) {
-        return find_folds<d>(points.data(), facets.data(), shared.data(), count, threads);
+    auto [crossings, folds] = with_dimension(points.shape(1), [&](auto d) {
+        const Crossings<d> tree(points.data(), facets.data(), count, threads);
+        return std::make_pair(tree.find(threads), find_folds(tree, shared.data(), count, threads));
     });
-    return to_numpy(std::move(pairs), 2);
+    return std::make_pair(to_numpy(std::move(crossings), 2), to_numpy(std::move(folds), 2));
 }
 
 auto enclosing_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
@@ -249,7 +250,8 @@ void bind_mesh(nb::module_& m) {
     m.def("rows", &rows_py, "values"_a.noconvert(), "which"_a.noconvert());
     m.def("moved", &moved_py, "before"_a.noconvert(), "after"_a.noconvert(), "threads"_a);
     m.def("crossings", &crossings_py, "points"_a.noconvert(), "facets"_a.noconvert(), "threads"_a);
-    m.def("folds", &folds_py, "points"_a.noconvert(), "facets"_a.noconvert(), "shared"_a.noconvert(), "threads"_a);
+    m.def("crossings_and_folds", &crossings_and_folds_py, "points"_a.noconvert(), "facets"_a.noconvert(),
+          "shared"_a.noconvert(), "threads"_a);
     m.def("enclosing", &enclosing_py, "points"_a.noconvert(), "facets"_a.noconvert(), "parts"_a.noconvert(),
           "places"_a.noconvert(), "own"_a.noconvert(), "threads"_a);
     m.attr("BLOCK_SIZE") = BLOCK_SIZE;

@@ -62,12 +62,13 @@ class Crossings {
         for (auto node = above_.rbegin(); node != above_.rend(); ++node) join(*node);
     }
 
+    // Pairs of facets that cross. Those whose boxes only touch along an axis do not: a plane is between them.
     std::vector<std::int32_t> find(int threads) const {
-        return find(threads, [&](std::int32_t a, std::int32_t b) { return cross(corners_of(a), corners_of(b)); });
+        return find<D>(threads, [&](std::int32_t a, std::int32_t b) { return cross(corners_of(a), corners_of(b)); });
     }
 
-    // Pairs of facets (a, b) whose boxes meet and for which `holds(a, b)`.
-    template <class Holds>
+    // Pairs of facets (a, b) for which `holds(a, b)` and whose boxes meet, along at least AXES axes beyond touching.
+    template <int AXES, class Holds>
     std::vector<std::int32_t> find(int threads, const Holds& holds) const {
         std::vector<std::vector<std::int32_t>> found(parts_.size());
         for_each_item(static_cast<std::int64_t>(parts_.size()), threads, [&](std::int64_t item) {
@@ -75,8 +76,8 @@ class Crossings {
             std::vector<std::int32_t> pairs;
             for_each_leaf(parts_[item], [&](const Part& leaf) {
                 near.clear();
-                find_leaves({0, 0, static_cast<std::int64_t>(order_.size())}, boxes_[leaf.node], near);
-                for (std::int64_t i = leaf.begin; i < leaf.end; ++i) search(near, i, holds, pairs);
+                find_leaves<AXES>({0, 0, static_cast<std::int64_t>(order_.size())}, boxes_[leaf.node], near);
+                for (std::int64_t i = leaf.begin; i < leaf.end; ++i) search<AXES>(near, i, holds, pairs);
             });
             found[item] = std::move(pairs);
         });
@@ -127,10 +128,17 @@ class Crossings {
             add(other.low);
             add(other.high);
         }
+
+        // As the boxes of pairs must, and so those of the nodes above them.
+        template <int AXES>
         bool meets(const Box& other) const {
             bool meets = true;
-            for (int k = 0; k < D; ++k) meets &= low[k] <= other.high[k] && other.low[k] <= high[k];
-            return meets;
+            int overlaps = 0;
+            for (int k = 0; k < D; ++k) {
+                meets &= (low[k] <= other.high[k]) & (other.low[k] <= high[k]);
+                overlaps += (low[k] < other.high[k]) & (other.low[k] < high[k]);
+            }
+            return meets & (overlaps >= AXES);
         }
     };
 
@@ -207,14 +215,18 @@ class Crossings {
         return box;
     }
 
-    // Which of the facets at LANES places from one on have boxes that meet another.
+    // Which of the facets at LANES places from one on have boxes that meet another so.
+    template <int AXES>
     PackMask meet_at(std::int64_t i, const Box& box) const {
         PackMask meet = constant<Pack>(box.high[0]) >= load_pack(&low_[0][i]);
+        Pack overlaps = constant<Pack>(0.0);
         for (int k = 0; k < D; ++k) {
-            meet = meet & (constant<Pack>(box.high[k]) >= load_pack(&low_[k][i]));
-            meet = meet & (load_pack(&high_[k][i]) >= constant<Pack>(box.low[k]));
+            const Pack low = load_pack(&low_[k][i]), high = load_pack(&high_[k][i]);
+            const Pack bottom = constant<Pack>(box.low[k]), top = constant<Pack>(box.high[k]);
+            meet = meet & (top >= low) & (high >= bottom);
+            overlaps += select((top > low) & (high > bottom), constant<Pack>(1.0), constant<Pack>(0.0));
         }
-        return meet;
+        return meet & (overlaps >= constant<Pack>(AXES));
     }
 
     // Cuts down to parts that are built by themselves.
@@ -272,33 +284,39 @@ class Crossings {
         for_each_leaf(second_half(part), f);
     }
 
-    // Appends the leaves whose boxes meet another.
+    // Appends the leaves whose boxes meet another so.
+    template <int AXES>
     void find_leaves(const Part& part, const Box& box, std::vector<Part>& leaves) const {
-        if (!boxes_[part.node].meets(box)) return;
+        if (!boxes_[part.node].template meets<AXES>(box)) return;
         if (part.end - part.begin <= LEAF) return leaves.push_back(part);
-        find_leaves(first_half(part), box, leaves);
-        find_leaves(second_half(part), box, leaves);
+        find_leaves<AXES>(first_half(part), box, leaves);
+        find_leaves<AXES>(second_half(part), box, leaves);
     }
 
     static Part first_half(const Part& part) { return {2 * part.node + 1, part.begin, (part.begin + part.end) / 2}; }
     static Part second_half(const Part& part) { return {2 * part.node + 2, (part.begin + part.end) / 2, part.end}; }
 
     // Appends the first pairs of a facet, by its place in the order, with those behind it by number that lie in some leaves.
-    template <class Holds>
+    template <int AXES, class Holds>
     void search(const std::vector<Part>& near, std::int64_t at, const Holds& holds, std::vector<std::int32_t>& found) const {
         const std::int32_t facet = order_[at];
         const Box box = box_at(at);
         const std::size_t full = found.size() + 2 * CROSSINGS_PER_FACET;
+        std::array<std::int32_t, LEAF> others;
         for (const Part& leaf : near) {
             if (found.size() >= full) return;
-            if (!boxes_[leaf.node].meets(box)) continue;
+            if (!boxes_[leaf.node].template meets<AXES>(box)) continue;
+            int count = 0;
             for (std::int64_t i = leaf.begin; i < leaf.end; i += LANES) {
-                const PackMask meet = meet_at(i, box);
-                if (!any(meet)) continue;
-                for (int lane = 0; lane < std::min<std::int64_t>(LANES, leaf.end - i); ++lane)
-                    if (meet[lane] && order_[i + lane] > facet && holds(facet, order_[i + lane]))
-                        found.insert(found.end(), {facet, order_[i + lane]});
+                const PackMask meet = meet_at<AXES>(i, box);
+                const int lanes = static_cast<int>(std::min<std::int64_t>(LANES, leaf.end - i));
+                for (int lane = 0; lane < lanes; ++lane) {  // without branches, which nobody could foresee
+                    others[count] = order_[i + lane];
+                    count += (meet[lane] != 0) & (order_[i + lane] > facet);
+                }
             }
+            for (int k = 0; k < count; ++k)
+                if (holds(facet, others[k])) found.insert(found.end(), {facet, others[k]});
         }
     }
 

@@ -1,4 +1,6 @@
-"""Nanoseconds per vertex of each move: `make bench`, or `python benchmarks/kernels.py [MESH]`.
+"""Nanoseconds per vertex of each move, and per fixed facet of the search for what crosses and folds.
+
+`make bench`, or `python benchmarks/kernels.py [MESH]`.
 
 One thread; the best of several runs, each from the same positions. LP and Laplacian steps start from a perturbed
 mesh, smoothing steps from the mesh that one untangling has made of it, as in use. Beside them the bound that memory
@@ -63,8 +65,19 @@ def nanoseconds(mesh: Mesh, move: Move, repeats: int) -> float:
     return best * 1e9
 
 
+def nanoseconds_per_facet(mesh: Mesh, repeats: int) -> tuple[int, float]:
+    """Return the number of fixed facets, and the best time for each."""
+    points, movable, best = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable), math.inf
+    facets, _, shared = mesh.topology.connectivity.fixed_facets(movable, 1)
+    for _ in range(repeats):
+        start = time.perf_counter()
+        kernels.crossings_and_folds(points, facets, shared, 1)
+        best = min(best, time.perf_counter() - start)
+    return len(facets), best / max(len(facets), 1) * 1e9
+
+
 def main() -> None:
-    """Print one table for a 2-D and a 3-D mesh."""
+    """Print the tables for a 2-D and a 3-D mesh."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("mesh", nargs="?", help="a valid mesh; default: generated ones")
     parser.add_argument("--repeats", type=int, default=5)
@@ -74,6 +87,7 @@ def main() -> None:
     speed = bytes_per_nanosecond(options.repeats)
     title = f"kernels, one thread; memory copies {speed:.1f} GB/s"
     table = Table("step", "mesh", "ns per vertex", "bound by memory", "target", title=title)
+    facets = Table("mesh", "fixed facets", "ns per facet", title="what crosses and folds")
     for mesh in meshes:
         tangled, _ = perturb(mesh, 25, mesh.mean_edge_length())
         outcome = untangle(tangled, smooth=0)
@@ -83,7 +97,10 @@ def main() -> None:
             target = TARGETS.get(move) if mesh.dimension == 3 else None
             figures = (nanoseconds(start, move, options.repeats), bytes_per_vertex(mesh, move) / speed)
             table.add_row(move.name.lower(), name, *(f"{one:.0f}" for one in figures), f"{target or ''}")
+        count, each = nanoseconds_per_facet(mesh, options.repeats)
+        facets.add_row(name, f"{count:,}", f"{each:.0f}")
     Console(width=100).print(table)
+    Console(width=100).print(facets)
 
 
 if __name__ == "__main__":

@@ -11,12 +11,14 @@ from typing import Any, Literal
 import generate
 import numpy as np
 import pytest
+from elements import MESHES
 from geometries import GEOMETRIES
 from meshes import tangle, with_an_inverted_fixed_simplex
 from scipy.spatial.transform import Rotation
 from tables import CASES
 
 from meshfix_cli import kernels, perturb, untangle
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import ceiling, displacement, summarise
@@ -394,6 +396,37 @@ def test_an_interior_in_one_point_is_solved_in_2d(plate: Mesh, strategy: str) ->
     points = plate.points.copy()
     points[plate.movable] = [1.5, 1.0]
     assert untangle(plate.with_points(points), strategy).valid
+
+
+@pytest.mark.parametrize("name", ["quads and triangles", "every solid"])
+def test_what_was_solved_before_leaves_no_trace(name: str, plate: Mesh, bracket: Mesh) -> None:
+    elements = tangle(Mesh.build(*MESHES[name]()))
+    simplices = tangle(plate if elements.dimension == 2 else bracket)
+    before = [untangle(mesh).after.points.tobytes() for mesh in (simplices, elements)]
+    assert [untangle(mesh).after.points.tobytes() for mesh in (simplices, elements)] == before
+
+
+@pytest.mark.parametrize("name", ["quads and triangles", "every solid"])
+def test_perturb_moves_a_share_of_all_vertices_of_any_elements_by_mean_edge_lengths(name: str) -> None:
+    points, blocks = MESHES[name]()
+    mesh = Mesh.build(points, blocks)
+    edges = {
+        (min(a, b), max(a, b))
+        for key, rows in blocks
+        for row in rows.tolist()
+        for facet in ELEMENTS[key].shape.facets
+        for a, b in zip((row[i] for i in facet), (row[i] for i in (*facet[1:], facet[0])), strict=True)
+    }
+    start, end = np.array(sorted(edges)).T
+    h = np.linalg.norm(points[end] - points[start], axis=1).mean()
+    tangled, count = perturb(mesh, 10, Distance.parse("2h").length(mesh), 7)
+    way = np.linalg.norm(tangled.points - points, axis=1)
+    assert count == (way > 0).sum() == round(0.1 * len(points))
+    assert way[way > 0] == pytest.approx(2 * h)
+    assert mesh.movable[way > 0].all()
+    more = perturb(mesh, 20, 2 * h, 7)[0]
+    np.testing.assert_allclose(more.points[way > 0], tangled.points[way > 0])
+    assert perturb(mesh, 100, h)[1] == mesh.movable.sum()
 
 
 def test_perturb_series_moves_the_same_vertices_in_the_same_directions(bracket: Mesh) -> None:

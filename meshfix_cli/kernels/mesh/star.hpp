@@ -83,7 +83,10 @@ struct Star {
         for (auto& p : neighbours) p = scale * p;
         position = scale * (load<D>(points + v * D) - origin);
         fill_blocks();
-        if (stars.elements != nullptr) set_roles(stars, v);
+        if (stars.elements == nullptr)
+            roles.clear();  // the star before may have been of another mesh
+        else
+            set_roles(stars, v);
     }
 
     void set_roles(const StarsView& stars, std::int64_t v) {

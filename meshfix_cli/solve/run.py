@@ -109,7 +109,8 @@ class Run:
         self.shaped = False  # since the smallest angle was raised
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
         self.untangling = 0  # sweeps
-        share = self.left / max(1, self.team.total(int(self.own.sum())))
+        self.count = self.team.total(int(self.own.sum()))  # of what can be mended, in all processes
+        share = self.left / max(1, self.count)
         self.many, self.most = share >= MANY, share >= MOST
         # A valid mesh keeps its smallest measure; in others those of the inverted elements were worse.
         self.min_measure = -math.inf if self.record.inverted else self.measure
@@ -220,11 +221,7 @@ class Run:
     def gained(self) -> bool:
         """Whether the mean or the smallest of the smallest angles is larger than in the input, by more than `GAIN`."""
         before, after = self._angles(self.first[0]), self._angles(self.points)
-        mean = (
-            self.team.total(self._steps(after) - self._steps(before))
-            / ANGLE_STEPS
-            / self.team.total(int(self.own.sum()))
-        )
+        mean = self.team.total(self._steps(after) - self._steps(before)) / ANGLE_STEPS / self.count
         rise = self._least(after) - self._least(before)
         return max(mean, rise) > math.radians(GAIN)
 
@@ -302,7 +299,7 @@ class Run:
     def _another_start(self) -> Iterator[Array]:
         """Yield the points with those near by in the graph's embedding, as far as they may go."""
         self.rival, self.best = self.best, None
-        self.fewest, self.largest = len(self.mendable), -math.inf
+        self.fewest, self.largest = self.count, -math.inf
 
         def compute(stars: kernels.Connectivity, points: Array, start: Array, near: Mask) -> Iterator[Array]:
             from meshfix_cli.solve.foldover import Reach, embedding
@@ -313,7 +310,7 @@ class Run:
 
     def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
-        if self.max_move < math.inf or self.left or not self.free.any():
+        if self.max_move < math.inf or self.left or not self._count(self.free):
             return
         angles = self._angles(self.points)
         smallest = self._least(angles)
@@ -359,7 +356,7 @@ class Run:
         """Yield sweeps around what is below the goal, turn by turn, as long as that becomes less or better."""
         self.floor = self.min_measure
         goal = min(GOAL[self.points.shape[1]] * self.threshold, math.pi / 2)
-        fewest, largest, waited = len(self.mendable), -math.inf, 0
+        fewest, largest, waited = self.count, -math.inf, 0
         angles = self._angles(self.points)
         well = self._least(angles) >= self.threshold and not (self.many and self.untangling > EASY)
         if well and phase.until == "threshold":

@@ -45,6 +45,7 @@ METHODS = {
     "plane": Method(),
     "planebest": Method(smooth="best"),
     "small": Method(),
+    "smallbest": Method(smooth="best"),
     "layers": Method(),
     "reference": Method(),
 }
@@ -54,7 +55,7 @@ def mesh_of(case: str) -> Mesh:
     """Return a mesh of 14 blocks; of "plane" 2-D, of FF and "small" of two or one."""
     if case.startswith("plane"):
         return tangle(Mesh.build(*generate.plate(0.035)))
-    if case == "small":
+    if case.startswith("small"):
         return tangle(Mesh.build(*generate.plate(0.18)))
     if case.endswith("FF"):
         return tangle(Mesh.build(*generate.bracket(0.18, 8)), 25, 2)

@@ -31,9 +31,13 @@ class Connectivity:
     def __init__(self, points: Float64, codes: Uint8, nodes: Int32, used: Int32, threads: int) -> None: ...
     def take_apart(self, flipped: NDArray[np.bool_], threads: int) -> None:
         """Give some elements (m,) the other orientation, and make the corner simplices of all."""
+    @overload
     @staticmethod
-    def part(simplices: Int32, n: int, threads: int) -> Connectivity:
-        """A part of a mesh that has an order already: n vertices and simplices (m, d+1) that stay as they are.
+    def part(simplices: Int32, n: int, threads: int) -> Connectivity: ...
+    @overload
+    @staticmethod
+    def part(codes: Uint8, nodes: Int32, n: int, dimension: int, threads: int) -> Connectivity:
+        """A part of a mesh that has an order already: n vertices and simplices or elements that stay as they are.
 
         Of what the facets tell, it has nothing.
         """
@@ -67,7 +71,10 @@ class Connectivity:
 
     @property
     def codes(self) -> Uint8:
-        """Empty where all elements are simplices of one type; then what follows is empty, too."""
+        """Empty where all elements are simplices of one type; then what follows is empty, too.
+
+        A part of a mesh of others may have no elements: it has offsets nevertheless.
+        """
 
     @property
     def node_offsets(self) -> Int32: ...

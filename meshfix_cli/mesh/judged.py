@@ -27,7 +27,7 @@ class Judged:
     def __init__(self, mesh: kernels.Connectivity, rows: NDArray[np.integer] | None = None) -> None:
         """Take the rows (k,) of elements; None: all of them."""
         self._mesh, self._rows = mesh, rows
-        if not len(mesh.codes):
+        if self.simplicial:
             self.simplices = mesh.simplices if rows is None else mesh.simplices[rows]
             return
         self._codes, self._offsets, self._nodes = mesh.codes, mesh.node_offsets, mesh.nodes
@@ -46,7 +46,7 @@ class Judged:
     @property
     def simplicial(self) -> bool:
         """Whether all elements of the mesh are simplices of one type."""
-        return not len(self._mesh.codes)
+        return not len(self._mesh.node_offsets)
 
     def without(self, positions: NDArray[np.integer]) -> Judged:
         """Return the others."""

@@ -84,7 +84,7 @@ class Topology:
     @property
     def simplicial(self) -> bool:
         """Whether all elements are simplices of one type."""
-        return not len(self.connectivity.codes)
+        return not len(self.connectivity.node_offsets)
 
     @property
     def element(self) -> Element:

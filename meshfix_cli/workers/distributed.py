@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import MeshfixError, on_one_line
+from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.mesh.topology import Topology
+from meshfix_cli.mesh.mixed import MixedTopology
+from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.records import Outcome, RankRecord, SweepRecord
@@ -52,8 +54,11 @@ class Part:
         How many are its own.
     points : (n, d) float64
     movable : (n,) bool
-    simplices : (m, d+1) int32
-        Those of the own vertices' stars, in the order of the whole, so that sums over a star have its order too.
+    codes : (m,) uint8 or None
+        The types of the elements; None: all are simplices of one type.
+    nodes : (m, d+1) int32, or (k,) int32
+        The vertices of the simplices, or of elements, one behind the other: all that have an own vertex, in the order
+        of the whole, so that sums over a star have its order too.
     own_elements, hopeless : (m,) bool
     owners, colours : (n - own,) int32
         Of the ghosts: the process that moves them and the colour of their block.
@@ -68,7 +73,8 @@ class Part:
     own: int
     points: Array
     movable: Mask
-    simplices: Numbers
+    codes: NDArray[np.uint8] | None
+    nodes: Numbers
     own_elements: Mask
     hopeless: Mask
     owners: Numbers
@@ -76,6 +82,15 @@ class Part:
     block_colours: Numbers
     reach: float
     reference: Array | None = None
+
+    def topology(self, threads: int) -> Topology:
+        """Return the topology of the part."""
+        n, m, d = len(self.vertices), len(self.own_elements), self.points.shape[1]
+        source, flipped = np.arange(m, dtype=np.int32), np.zeros(m, dtype=bool)
+        if self.codes is None:
+            return Topology(n, source, flipped, kernels.Connectivity.part(self.nodes, n, threads))
+        elements = kernels.Connectivity.part(self.codes, self.nodes, n, d, threads)
+        return MixedTopology(n, source, flipped, elements)
 
 
 class Root:
@@ -238,14 +253,15 @@ def parts(
     owner, number = np.repeat(of_block, kernels.BLOCK_SIZE)[: len(points)], np.empty(len(points), dtype=np.int32)
     for rank in range(ranks):
         blocks = np.flatnonzero(of_block == rank)
-        own, rows = _stars_of(stars, blocks)
-        simplices = stars.simplices[rows]
-        vertices = np.unique(simplices)
+        own, simplices = _stars_of(stars, blocks)
+        rows = distinct(mesh.topology.owners(simplices))
+        codes, nodes, first = _elements(stars, rows)
+        vertices = distinct(nodes)
         ghosts = vertices[owner[vertices] != rank]
         vertices = np.concatenate([own, ghosts])
         number[vertices] = np.arange(len(vertices), dtype=np.int32)
         yield Part(
-            vertices, len(own), points[vertices], movable[vertices], number[simplices], owner[simplices[:, 0]] == rank,
+            vertices, len(own), points[vertices], movable[vertices], codes, number[nodes], owner[first] == rank,
             np.zeros(len(rows), dtype=bool) if hopeless is None else hopeless[rows],
             owner[ghosts], colour[ghosts // kernels.BLOCK_SIZE], colour[blocks], reach,
             None if reference is None else reference[vertices],
@@ -261,6 +277,15 @@ def _stars_of(stars: kernels.Connectivity, blocks: NDArray[np.intp]) -> tuple[Nu
     corners = [stars.corners[stars.offsets[begin] : stars.offsets[end]] for begin, end in ranges]
     none = [np.empty(0, dtype=np.int32)]
     return np.concatenate(own or none), np.unique(np.concatenate(corners or none) // stars.simplices.shape[1])
+
+
+def _elements(stars: kernels.Connectivity, rows: Numbers) -> tuple[NDArray[np.uint8] | None, Numbers, Numbers]:
+    """Return the types and the vertices of some elements, see `Part`, and the first vertex of each."""
+    elements = Judged(stars)
+    nodes = elements.vertices(rows)
+    if elements.simplicial:
+        return None, nodes, nodes[:, 0]
+    return stars.codes[rows], nodes, stars.nodes[stars.node_offsets[rows]]
 
 
 def partition(stars: kernels.Connectivity, ranks: int) -> Numbers:
@@ -313,9 +338,7 @@ class Ranks:
     def __init__(self, comm: Intracomm, part: Part, whole: kernels.Connectivity | None, threads: int) -> None:
         self.comm, self.part, self.whole = comm, part, whole
         self.messages, self.bytes = 0, 0
-        connectivity = kernels.Connectivity.part(part.simplices, len(part.vertices), threads)
-        m = len(part.simplices)
-        topology = Topology(len(part.vertices), np.arange(m, dtype=np.int32), np.zeros(m, dtype=bool), connectivity)
+        topology = part.topology(threads)
         self.mesh = Mesh(part.points, topology, part.movable)
         self.stars = topology.stars(threads)
         self.own_vertices = np.arange(len(part.vertices)) < part.own
@@ -395,7 +418,7 @@ class Ranks:
     def record(self) -> RankRecord:
         """Return what this process held and sent."""
         own = self.part.own
-        ghosts, elements = len(self.part.vertices) - own, len(self.part.simplices)
+        ghosts, elements = len(self.part.vertices) - own, len(self.part.own_elements)
         return RankRecord(own, ghosts, elements, peak_memory(), self.messages, self.bytes / 1e6)
 
     def _reduced(self, value: NDArray[Any], operation: Any) -> Any:

@@ -9,9 +9,10 @@ from copy import deepcopy
 import generate
 import numpy as np
 import pytest
+from elements import MESHES
 from meshes import tangle
 
-from meshfix_cli import untangle
+from meshfix_cli import kernels, untangle
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.summary import summarise
@@ -185,6 +186,24 @@ def test_a_mesh_survives_pickling_with_its_order(mesh: Mesh) -> None:
         assert copy.points.tobytes() == tangled.points.tobytes()
         np.testing.assert_array_equal(copy.topology.simplices, tangled.topology.simplices)
         assert untangle(copy).after.points.tobytes() == untangle(tangled).after.points.tobytes()
+
+
+@pytest.mark.parametrize("name", ["every solid", "quads and triangles"])
+def test_elements_survive_pickling_before_and_after_their_stars_are_built(name: str) -> None:
+    mesh = Mesh.build(*MESHES[name]())
+    before = pickle.loads(pickle.dumps(mesh))
+    mesh.topology.stars()
+    kept = [key for key in dir(mesh.topology.connectivity) if isinstance(getattr(kernels.Connectivity, key), property)]
+    assert {"codes", "nodes", "facet_mates", "owners", "faces"} <= set(kept)
+    tangled = tangle(mesh)
+    expected = untangle(tangled).after.points.tobytes()
+    for copy in (before, pickle.loads(pickle.dumps(mesh)), deepcopy(mesh)):
+        assert type(copy.topology) is type(mesh.topology)
+        stars = copy.topology.stars()
+        for key in kept:
+            if key != "mates":  # of simplices
+                np.testing.assert_array_equal(getattr(stars, key), getattr(mesh.topology.connectivity, key))
+        assert untangle(copy.with_points(tangled.points)).after.points.tobytes() == expected
 
 
 def test_one_mesh_may_be_used_by_several_threads() -> None:

@@ -7,14 +7,18 @@ the records are the same.
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 sys.path += [str(Path(__file__).parents[2] / name) for name in ("sample_meshes", "benchmarks", "tests/support")]
+import elements
 import generate
+from building import Blocks
 from layered import Points, body_of, layered, left_behind
 from meshes import tangle, with_an_inverted_fixed_simplex
 
@@ -26,6 +30,13 @@ from meshfix_cli.solve.records import Outcome
 from meshfix_cli.workers.distributed import ROOT, Root, serve
 
 REACH = Distance(3.0, in_h=True)
+# Those of elements that are not simplices alone; the second is of one block.
+ELEMENTS: dict[str, Callable[[], tuple[Points, Blocks]]] = {
+    "hexes": partial(elements.box_of_hexahedra, 5000),
+    "fewsolids": elements.every_solid,
+    "solids": elements.hexahedra_and_wedges,
+    "quads": elements.quad_plate,
+}
 METHODS = {
     "auto": Method(),
     "best": Method(smooth="best"),
@@ -46,15 +57,25 @@ METHODS = {
     "planebest": Method(smooth="best"),
     "small": Method(),
     "smallbest": Method(smooth="best"),
+    "hexes": Method(),
+    "hexesFF": Method("FF"),
+    "hexesonlyinvalid": Method(only_invalid=True),
+    "solids": Method(smooth="best"),
+    "fewsolids": Method(smooth="best"),
+    "quads": Method(smooth="best"),
     "layers": Method(),
     "reference": Method(),
 }
 
 
 def mesh_of(case: str) -> Mesh:
-    """Return a mesh of 14 blocks; of "plane" 2-D, of FF and "small" of two or one."""
+    """Return a mesh of 14 blocks; of "plane" 2-D, of FF and "small" of two or one; of `ELEMENTS` of up to six."""
     if case.startswith("plane"):
         return tangle(Mesh.build(*generate.plate(0.035)))
+    for name, made in ELEMENTS.items():
+        if case.startswith(name):
+            valid = Mesh.build(*made())
+            return bent(valid) if case.endswith("reference") else tangle(valid, 25, 1 if "only" in case else 2)
     if case.startswith("small"):
         return tangle(Mesh.build(*generate.plate(0.18)))
     if case.endswith("FF"):
@@ -69,15 +90,22 @@ def mesh_of(case: str) -> Mesh:
     if case == "finished":  # nothing is left to be gained
         return Method(smooth="best").solve(Method(smooth="best").solve(valid, np.inf, 2).after, np.inf, 2).after
     if case == "reference":
-        bent = valid.points + 0.3 * np.sin(2 * valid.points[:, [1, 2, 0]])
-        return valid.with_points(np.where(valid.movable[:, None], valid.points, bent))
+        return bent(valid)
     return tangle(valid, 25, 1 if case == "onlyinvalid" else 2)
+
+
+def bent(valid: Mesh) -> Mesh:
+    """Return a solid whose boundary has moved."""
+    moved = valid.points + 0.3 * np.sin(2 * valid.points[:, [1, 2, 0]])
+    return valid.with_points(np.where(valid.movable[:, None], valid.points, moved))
 
 
 def reference_of(case: str, mesh: Mesh) -> Points | None:
     """Return where the vertices of a mesh were before its boundary moved, where that is the case."""
-    valid = Mesh.build(*generate.bracket(0.06, 10)) if case == "reference" else None
-    return None if valid is None else reference_points(mesh, valid)
+    if not case.endswith("reference"):
+        return None
+    made = ELEMENTS["solids"]() if case == "solidsreference" else generate.bracket(0.06, 10)
+    return reference_points(mesh, Mesh.build(*made))
 
 
 def facts(outcome: Outcome) -> tuple[Any, ...]:

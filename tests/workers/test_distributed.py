@@ -308,13 +308,40 @@ def test_parts_are_whole_blocks_and_one_layer_of_ghosts(fine: Mesh, ranks: int) 
     simplices = 0
     for part, mine in zip(found, own, strict=True):
         here = np.isin(stars.simplices, list(mine)).any(axis=1)
-        np.testing.assert_array_equal(part.vertices[part.simplices], stars.simplices[here])
+        assert part.codes is None
+        np.testing.assert_array_equal(part.vertices[part.nodes], stars.simplices[here])
         assert set(part.vertices[part.own :].tolist()) == set(stars.simplices[here].ravel().tolist()) - mine
         assert (np.diff(part.vertices[: part.own]) > 0).all()
         for ghost, owner in zip(part.vertices[part.own :].tolist(), part.owners.tolist(), strict=True):
             assert ghost in own[owner]
         simplices += int(part.own_elements.sum())
     assert simplices == fine.topology.m
+
+
+@pytest.mark.parametrize("name", over_ranks.ELEMENTS)
+@pytest.mark.parametrize("ranks", [1, 2, 3])
+def test_parts_have_all_elements_of_their_vertices(name: str, ranks: int) -> None:
+    """Whole, in the order of the mesh; what the kernels know of a part is what they know of the mesh."""
+    mesh = Mesh.build(*over_ranks.ELEMENTS[name]())
+    stars, count = mesh.topology.stars(), 0
+    rows = np.split(stars.nodes, stars.node_offsets[1:-1])
+    for part in all_parts(mesh, ranks):
+        mine = set(part.vertices[: part.own].tolist())
+        here = [e for e, nodes in enumerate(rows) if mine & set(nodes.tolist())]
+        held = part.topology(1).stars()
+        assert held.codes.tolist() == stars.codes[here].tolist()
+        nodes = np.split(part.vertices[held.nodes], held.node_offsets[1:-1])
+        assert [row.tolist() for row in nodes if len(row)] == [rows[e].tolist() for e in here]
+        assert set(part.vertices[part.own :].tolist()) == {v for e in here for v in rows[e].tolist()} - mine
+        for own in range(0, part.own, 97):
+            vertex = part.vertices[own]
+            for offsets, values in (("offsets", "faces"), ("neighbour_offsets", "neighbours")):
+                (a, b), (c, d) = (getattr(one, offsets)[[v, v + 1]] for one, v in ((held, own), (stars, vertex)))
+                k = mesh.dimension if values == "faces" else 1
+                one, other = getattr(held, values).ravel()[k * a : k * b], getattr(stars, values).ravel()[k * c : k * d]
+                np.testing.assert_array_equal(one if values == "faces" else part.vertices[one], other)
+        count += int(part.own_elements.sum())
+    assert count == mesh.topology.m
 
 
 def test_the_partition_is_balanced(fine: Mesh) -> None:

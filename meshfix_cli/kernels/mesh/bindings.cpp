@@ -59,11 +59,30 @@ auto element_view(PyConnectivity& self) {
     return Vector<const T>(values.data(), {values.size()}, nb::find(self));
 }
 
+template <class Array>
+auto copied(const Array& array) {
+    return std::vector<std::remove_const_t<typename Array::Scalar>>(array.data(), array.data() + array.size());
+}
+
 PyConnectivity* part_py(const Matrix<const std::int32_t>& simplices, std::int64_t n, int threads) {
     auto self = std::make_unique<PyConnectivity>();
     self->dimension = static_cast<int>(simplices.shape(1)) - 1;
     self->mesh = with_dimension(simplices.shape(1) - 1, [&](auto d) {
-        return part_of_mesh<d>(simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), n, threads);
+        return part_of_mesh<d>({simplices.data(), simplices.data() + simplices.size()}, {},
+                               static_cast<std::int64_t>(simplices.shape(0)), n, threads);
+    });
+    return self.release();
+}
+
+PyConnectivity* part_of_elements_py(const Vector<const std::uint8_t>& codes, const Vector<const std::int32_t>& nodes,
+                                    std::int64_t n, int dimension, int threads) {
+    auto self = std::make_unique<PyConnectivity>();
+    self->dimension = dimension;
+    self->mesh = with_dimension(static_cast<std::size_t>(dimension), [&](auto d) {
+        Elements elements = elements_of(copied(codes), copied(nodes));
+        std::vector<std::int32_t> simplices = corner_simplices<d>(elements, threads);
+        return part_of_mesh<d>(std::move(simplices), std::move(elements), static_cast<std::int64_t>(codes.size()), n,
+                               threads);
     });
     return self.release();
 }
@@ -86,37 +105,34 @@ void build_stars_py(PyConnectivity& self, int threads) {
     });
 }
 
-// All but the stars, which are built again.
+// All but the stars, which are built again, and what follows from the shapes of elements.
 nb::tuple state_of(PyConnectivity& self) {
-    return nb::make_tuple(self.dimension, self.mesh.orientable, rows_view<&Connectivity::simplices>(self),
-                          rows_view<&Connectivity::mates>(self), view<&Connectivity::vertices>(self),
+    return nb::make_tuple(self.dimension, self.mesh.orientable, self.mesh.elements.empty(),
+                          element_view<&Elements::codes>(self), element_view<&Elements::nodes>(self),
+                          view<&Connectivity::simplices>(self), view<&Connectivity::mates>(self), view<&Connectivity::vertices>(self),
                           view<&Connectivity::rows>(self), view<&Connectivity::offsets>(self),
                           view<&Connectivity::corners>(self), view<&Connectivity::component>(self),
                           view<&Connectivity::against>(self));
 }
 
-template <class Array>
-auto copied(const Array& array) {
-    return std::vector<std::remove_const_t<typename Array::Scalar>>(array.data(), array.data() + array.size());
-}
-
 using Int32s = Vector<const std::int32_t>;
-using Int32Rows = Matrix<const std::int32_t>;
-using State = std::tuple<int, bool, Int32Rows, Int32Rows, Int32s, Int32s, Int32s, Int32s, Int32s, Vector<const std::uint8_t>>;
+using Uint8s = Vector<const std::uint8_t>;
+using State = std::tuple<int, bool, bool, Uint8s, Int32s, Int32s, Int32s, Int32s, Int32s, Int32s, Int32s, Int32s, Uint8s>;
 
 void restore(PyConnectivity& self, const State& state) {
     new (&self) PyConnectivity();
     Connectivity& mesh = self.mesh;
     self.dimension = std::get<0>(state);
     mesh.orientable = std::get<1>(state);
-    mesh.simplices = copied(std::get<2>(state));
-    mesh.mates = copied(std::get<3>(state));
-    mesh.vertices = copied(std::get<4>(state));
-    mesh.rows = copied(std::get<5>(state));
-    mesh.offsets = copied(std::get<6>(state));
-    mesh.corners = copied(std::get<7>(state));
-    mesh.component = copied(std::get<8>(state));
-    mesh.against = copied(std::get<9>(state));
+    if (!std::get<2>(state)) mesh.elements = elements_of(copied(std::get<3>(state)), copied(std::get<4>(state)));
+    mesh.simplices = copied(std::get<5>(state));
+    mesh.mates = copied(std::get<6>(state));
+    mesh.vertices = copied(std::get<7>(state));
+    mesh.rows = copied(std::get<8>(state));
+    mesh.offsets = copied(std::get<9>(state));
+    mesh.corners = copied(std::get<10>(state));
+    mesh.component = copied(std::get<11>(state));
+    mesh.against = copied(std::get<12>(state));
 }
 
 auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int rings) {
@@ -273,6 +289,8 @@ void bind_mesh(nb::module_& m) {
         .def("__getstate__", &state_of)
         .def("__setstate__", &restore)
         .def_static("part", &part_py, "simplices"_a.noconvert(), "n"_a, "threads"_a)
+        .def_static("part", &part_of_elements_py, "codes"_a.noconvert(), "nodes"_a.noconvert(), "n"_a, "dimension"_a,
+                    "threads"_a)
         .def("flip", &flip_py, "flipped"_a.noconvert(), "threads"_a)
         .def("signed_sizes", &signed_sizes_py, "points"_a.noconvert())
         .def("build_stars", &build_stars_py, "threads"_a)

@@ -19,7 +19,8 @@ struct Elements {
     std::vector<std::uint8_t> codes;
     std::vector<std::int32_t> offsets, nodes, facet_offsets, facet_owners, simplex_offsets, owners;
 
-    bool empty() const { return codes.empty(); }
+    // All elements are simplices of one type. A part of a mesh of others may have none, and is not empty.
+    bool empty() const { return offsets.empty(); }
     std::int64_t size() const { return static_cast<std::int64_t>(codes.size()); }
     const ElementShape& shape(std::int64_t e) const { return SHAPES[codes[e]]; }
     const std::int32_t* nodes_of(std::int64_t e) const { return nodes.data() + offsets[e]; }
@@ -46,6 +47,19 @@ inline std::vector<std::int32_t> owners_of(const std::vector<std::int32_t>& offs
     return owners;
 }
 
+// The elements as they come; what follows from their shapes is found.
+inline Elements elements_of(std::vector<std::uint8_t> codes, std::vector<std::int32_t> nodes) {
+    Elements elements;
+    elements.offsets = offsets_by_shape(codes, &ElementShape::nodes);
+    elements.facet_offsets = offsets_by_shape(codes, &ElementShape::facets);
+    elements.facet_owners = owners_of(elements.facet_offsets);
+    elements.simplex_offsets = offsets_by_shape(codes, &ElementShape::simplices);
+    elements.owners = owners_of(elements.simplex_offsets);
+    elements.codes = std::move(codes);
+    elements.nodes = std::move(nodes);
+    return elements;
+}
+
 // The elements as they come, with nodes in the numbers `number`, by their first vertices; `rows`: where each came from.
 inline Elements ordered_elements(const std::uint8_t* codes, const std::int32_t* nodes, std::int64_t m,
                                  const std::vector<std::int32_t>& number, std::int64_t n,
@@ -60,17 +74,14 @@ inline Elements ordered_elements(const std::uint8_t* codes, const std::int32_t* 
     std::partial_sum(next.begin(), next.end(), next.begin());
     rows.resize(m);
     for (std::int64_t e = 0; e < m; ++e) rows[next[first[e]]++] = static_cast<std::int32_t>(e);
-    Elements elements;
-    elements.codes.resize(m);
-    for (std::int64_t e = 0; e < m; ++e) elements.codes[e] = codes[rows[e]];
-    elements.offsets = offsets_by_shape(elements.codes, &ElementShape::nodes);
-    elements.nodes.resize(elements.offsets.back());
-    for (std::int64_t e = 0; e < m; ++e)
-        for (std::int32_t i = 0; i < SHAPES[elements.codes[e]].nodes; ++i)
-            elements.nodes[elements.offsets[e] + i] = number[nodes[from[rows[e]] + i]];
-    elements.facet_offsets = offsets_by_shape(elements.codes, &ElementShape::facets);
-    elements.facet_owners = owners_of(elements.facet_offsets);
-    return elements;
+    std::vector<std::uint8_t> ordered_codes(m);
+    std::vector<std::int32_t> ordered_nodes;
+    ordered_nodes.reserve(from.back());
+    for (std::int64_t e = 0; e < m; ++e) {
+        ordered_codes[e] = codes[rows[e]];
+        for (std::int32_t i = from[rows[e]]; i < from[rows[e] + 1]; ++i) ordered_nodes.push_back(number[nodes[i]]);
+    }
+    return elements_of(std::move(ordered_codes), std::move(ordered_nodes));
 }
 
 // A facet from its smallest vertex on. Two elements that are numbered consistently pass it in opposite directions.
@@ -196,9 +207,7 @@ inline void mirror(Elements& elements, std::vector<std::int32_t>& mates, const s
 
 // The corner simplices (s, D+1).
 template <int D>
-std::vector<std::int32_t> corner_simplices(Elements& elements, int threads) {
-    elements.simplex_offsets = offsets_by_shape(elements.codes, &ElementShape::simplices);
-    elements.owners = owners_of(elements.simplex_offsets);
+std::vector<std::int32_t> corner_simplices(const Elements& elements, int threads) {
     std::vector<std::int32_t> simplices(static_cast<std::size_t>(elements.simplex_offsets.back()) * (D + 1));
     for_each_range(elements.size(), PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         for (std::int64_t e = begin; e < end; ++e) {

@@ -100,29 +100,35 @@ Connectivity connect_elements(const double* points, std::int64_t n, const std::u
     return mesh;
 }
 
-// Gives some elements (m) the other orientation, and takes all apart into their corner simplices.
+// Finds the corners at each vertex.
 template <int D>
-void take_apart(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
-    mirror(mesh.elements, mesh.mates, flipped);
-    mesh.simplices = corner_simplices<D>(mesh.elements, threads);
+void find_corners(Connectivity& mesh, int threads) {
     const auto count = static_cast<std::int64_t>(mesh.simplices.size()) / (D + 1);
     Incidence csr = incidence<D>(mesh.simplices.data(), count, mesh.n(), threads);
     mesh.offsets = std::move(csr.offsets);
     mesh.corners = std::move(csr.corners);
 }
 
-// A part of a mesh that has an order already: its vertices and simplices, as they come.
+// Gives some elements (m) the other orientation, and takes all apart into their corner simplices.
 template <int D>
-Connectivity part_of_mesh(const std::int32_t* simplices, std::int64_t m, std::int64_t n, int threads) {
+void take_apart(Connectivity& mesh, const std::uint8_t* flipped, int threads) {
+    mirror(mesh.elements, mesh.mates, flipped);
+    mesh.simplices = corner_simplices<D>(mesh.elements, threads);
+    find_corners<D>(mesh, threads);
+}
+
+// A part of a mesh that has an order already: its n vertices and its simplices or elements (m), as they come.
+template <int D>
+Connectivity part_of_mesh(std::vector<std::int32_t> simplices, Elements elements, std::int64_t m, std::int64_t n,
+                          int threads) {
     Connectivity part;
-    part.simplices.assign(simplices, simplices + m * (D + 1));
+    part.simplices = std::move(simplices);
+    part.elements = std::move(elements);
     part.vertices.resize(n);
     part.rows.resize(m);
     std::iota(part.vertices.begin(), part.vertices.end(), 0);
     std::iota(part.rows.begin(), part.rows.end(), 0);
-    Incidence csr = incidence<D>(simplices, m, n, threads);
-    part.offsets = std::move(csr.offsets);
-    part.corners = std::move(csr.corners);
+    find_corners<D>(part, threads);
     return part;
 }
 

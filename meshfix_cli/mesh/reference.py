@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import counted
+from meshfix_cli.mesh.elements import JUDGED, Shape, counted
 from meshfix_cli.mesh.mesh import Mesh
 
 
@@ -21,17 +21,17 @@ def reference_points(mesh: Mesh, reference: Mesh, threads: int = 1) -> NDArray[n
     Raises
     ------
     InvalidMeshError
-        The numbers of points or elements differ, an element has other vertices, or one of the reference is inverted.
+        The numbers of points or elements differ, an element has other vertices or joins them otherwise, or one of the
+        reference is inverted.
     """
     shape = mesh.topology.element.shape
     ours, theirs = _counts(mesh), _counts(reference)
     if ours != theirs:
         raise InvalidMeshError(f"it has {theirs}, and the mesh {ours}")
-    same = np.sort(mesh.topology.simplices, axis=1) == np.sort(reference.topology.simplices, axis=1)
-    if not same.all():
-        row = int(np.argmin(same.all(axis=1)))
-        here, there = (sorted(one.topology.simplices[row].tolist()) for one in (mesh, reference))
-        raise InvalidMeshError(f"its {shape.name} {row} has the vertices {there}, and that of the mesh {here}")
+    row = _first_difference(mesh, reference)
+    if row is not None:
+        (_, here), (name, there) = _element(mesh, row), _element(reference, row)
+        raise InvalidMeshError(f"its {name} {row} has the vertices {there}, and that of the mesh {here}")
     inverted = reference.check(threads)[0]
     if inverted:
         raise InvalidMeshError(f"{counted(inverted, f'{shape.name} of it is', f'{shape.plural} of it are')} inverted")
@@ -41,3 +41,42 @@ def reference_points(mesh: Mesh, reference: Mesh, threads: int = 1) -> NDArray[n
 def _counts(mesh: Mesh) -> str:
     shape = mesh.topology.element.shape
     return f"{counted(len(mesh.points), 'point', 'points')} and {counted(mesh.topology.m, shape.name, shape.plural)}"
+
+
+def _first_difference(mesh: Mesh, reference: Mesh) -> int | None:
+    """Return the first element that is not the same, whichever of its nodes comes first."""
+    different = _types(mesh) != _types(reference)
+    if not different.any():
+        for block, other in zip(mesh.topology.blocks, reference.topology.blocks, strict=True):
+            here, there = (_joined(one.vertices, block.element.shape) for one in (block, other))
+            different[block.rows] = (here != there).any(axis=1)
+    return int(np.argmax(different)) if different.any() else None
+
+
+def _types(mesh: Mesh) -> NDArray[np.uint8]:
+    types = np.empty(mesh.topology.m, dtype=np.uint8)
+    for block in mesh.topology.blocks:
+        types[block.rows] = JUDGED.index(block.element)
+    return types
+
+
+def _joined(vertices: NDArray[np.int32], shape: Shape) -> NDArray[np.int32]:
+    """Return, for elements (k, nodes) of a shape, what does not depend on which node comes first.
+
+    These are their vertices, ascending, and which of them are joined by edges.
+    """
+    order = np.argsort(vertices, axis=1)
+    ascending = np.take_along_axis(vertices, order, axis=1)
+    if len(shape.simplices) == 1:  # each is joined to every other
+        return ascending
+    joined = np.zeros((shape.corners, shape.corners), dtype=np.int32)
+    for first, *others in shape.simplices:
+        joined[first, others] = joined[others, first] = 1
+    edges = joined[order[:, :, None], order[:, None, :]]
+    return np.concatenate([ascending, edges.reshape(len(vertices), -1)], axis=1)
+
+
+def _element(mesh: Mesh, row: int) -> tuple[str, list[int]]:
+    """Return the name and the vertices of an element."""
+    block = next(block for block in mesh.topology.blocks if row in block.rows)
+    return block.element.shape.name, block.vertices[np.searchsorted(block.rows, row)].tolist()

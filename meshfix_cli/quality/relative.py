@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.mesh.judged import VALID, Judged
 from meshfix_cli.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -33,7 +34,16 @@ def mean_ratios(points: Array, reference: Array, simplices: NDArray[np.int32]) -
     return np.divide(d * det ** (2 / d), square, out=np.zeros_like(det), where=square > 0)
 
 
-def worst_and_mean_to(mesh: Mesh, reference: Array) -> tuple[float, float]:
-    """Return the smallest and the mean of `mean_ratios`; the reference (k, d) is in the order of the connectivity."""
-    values = mean_ratios(mesh.along_curve(mesh.points), reference, mesh.topology.connectivity.simplices)
+def worst_and_mean_to(mesh: Mesh, reference: Array, threads: int = 1) -> tuple[float, float]:
+    """Return the smallest and the mean over the elements; the reference (k, d) is in the order of the connectivity.
+
+    That of a simplex is its mean ratio, that of another element the smallest of its corners, or 0 where it is not valid
+    inside.
+    """
+    connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
+    values = mean_ratios(points, reference, connectivity.simplices)
+    if not mesh.topology.simplicial:
+        verdicts = Judged(connectivity).verdicts(points, threads)
+        values = np.minimum.reduceat(values, connectivity.simplex_offsets[:-1])
+        values[verdicts != VALID] = 0.0
     return float(values.min()), float(values.mean())

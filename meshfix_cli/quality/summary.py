@@ -125,7 +125,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         histogram=tuple(histogram.tolist()),
         metrics={name: worst_and_mean(name, mesh) for name in metrics},
         inverted_elements=np.sort(connectivity.rows[inverted]),
-        to_reference=None if reference is None else worst_and_mean_to(mesh, reference),
+        to_reference=None if reference is None else worst_and_mean_to(mesh, reference, threads),
     )
 
 
@@ -153,7 +153,7 @@ def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, refere
         histogram=tuple(np.bincount(bins, minlength=JACOBIAN_BINS).tolist()),
         metrics={name: worst_and_mean(name, mesh) for name in metrics},
         inverted_elements=np.flatnonzero(by_row != VALID).astype(np.int32),
-        to_reference=None if reference is None else worst_and_mean_to(mesh, reference),
+        to_reference=None if reference is None else worst_and_mean_to(mesh, reference, threads),
         jacobians=Jacobians(float(jacobians.min()), float(jacobians.mean()), float(np.percentile(jacobians, 1))),
         kinds=tuple(_kind(block, by_row[block.rows], jacobians[block.rows]) for block in topology.blocks),
     )

@@ -250,14 +250,20 @@ class _Region(Region):
         return len(kernels.check(points, self.global_simplices, self.threads)[0]) == 0
 
     def approach(self, start: Array, targets: Array) -> Iterator[Array]:
-        """Yield valid points after each minimisation from valid ones; that a simplex is inverted costs too much."""
-        problem = self._problem(start, targets)
+        """Yield valid points after each minimisation from valid ones; that a simplex is inverted costs too much.
+
+        The energy does not see that an element is invalid inside: its vertices go back, and nothing follows.
+        """
+        problem, points = self._problem(start, targets), start
         while True:
             before, after = problem.minimise(LAST_EPS, WEIGHT, ITERATIONS, 0.0, until_valid=False)
-            points = self._moved(start, problem)
-            if not (after < before and self.is_valid(points)):
+            moved = self._moved(start, problem)
+            if not (after < before and self.is_valid(moved)):
                 return
+            points = self.retreated(points, moved, -math.inf, self.threads)
             yield points
+            if points is not moved:
+                return
 
     def _problem(self, start: Array, targets: Array, drawn: bool = False) -> kernels.Foldover:
         """Make the energy of targets (s,), or of the inverse matrices (s, d, d) of those."""

@@ -6,6 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.judged import Judged
+from meshfix_cli.mesh.topology import distinct
+
+Array = NDArray[np.float64]
+RETREATS = 20
 
 
 class Region:
@@ -23,6 +28,8 @@ class Region:
         The simplices of the stars, in the numbers of the mesh.
     simplices : (s, d+1) int32
         The same, with the vertices numbered as in `vertices`.
+    elements : Judged or None
+        The elements with a free vertex; None: they are the simplices.
     """
 
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_]) -> None:
@@ -36,3 +43,32 @@ class Region:
         number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
         self.global_simplices = np.ascontiguousarray(simplices)
         self.simplices = np.ascontiguousarray(number[simplices])
+        self.elements = Judged(mesh, distinct(mesh.owners[self.rows])) if len(mesh.codes) else None
+
+    def retreated(self, start: Array, moved: Array, least: float, threads: int) -> Array:
+        """Return moved points (n, d) where no element of the region is inverted, and none gets very small.
+
+        The vertices of what is inverted, or smaller than the least measure, go back half of the way, again and again.
+
+        Parameters
+        ----------
+        start : (n, d) float64
+            Where all are valid; returned where nothing else is.
+        moved : (n, d) float64
+            Returned, itself, where all are valid.
+        least : float
+            Of the corner simplices, in model units.
+        threads : int
+        """
+        way, share = moved - start, np.ones((len(start), 1))
+        for _ in range(RETREATS):
+            measure, valid = kernels.measure(moved, self.global_simplices, threads)
+            wrong = self.global_simplices[(valid == 0) | (measure < least)]
+            if self.elements is not None:
+                inverted = self.elements.vertices(self.elements.check(moved, threads)[0])
+                wrong = np.concatenate([wrong.ravel(), inverted])
+            if not wrong.size:
+                return moved
+            share[np.unique(wrong)] *= 0.5
+            moved = np.where(share < 1, start + share * way, moved)
+        return start

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import JUDGED
-from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.solve.region import Region
 
 Array = NDArray[np.float64]
 
 ITERATIONS = 100
-RETREATS = 20
 WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
 
 
@@ -64,28 +62,10 @@ def shaped(
         points[region.vertices], region.simplices, _corners(mesh, region), len(region.moving), goal.angle, goal.floor,
         goal.measure, WEIGHT, ITERATIONS, threads,
     )  # fmt: skip
-    return _retreated(points, moved, mesh, region.global_simplices, goal.measure, threads)
+    return region.retreated(points, moved, goal.measure, threads)
 
 
 def _corners(mesh: kernels.Connectivity, region: Region) -> Array:
     """Return the weights (s,) of scaled Jacobians, 0 for whole simplices; (0,) where all are."""
     weights = np.array([one.shape.weight if len(one.shape.simplices) > 1 else 0.0 for one in JUDGED])
     return weights[mesh.codes[mesh.owners[region.rows]]] if len(mesh.codes) else np.empty(0)
-
-
-def _retreated(
-    start: Array, moved: Array, mesh: kernels.Connectivity, simplices: NDArray[np.int32], least: float, threads: int
-) -> Array:
-    """Let the vertices of elements that are not valid, or smaller than the least measure, go back half of the way."""
-    judged = Judged(mesh)
-    way, share = moved - start, np.ones((len(start), 1))
-    for _ in range(RETREATS):
-        measure, valid = kernels.measure(moved, simplices, threads)
-        wrong = simplices[(valid == 0) | (measure < least)]
-        if not judged.simplicial:
-            wrong = np.concatenate([wrong.ravel(), judged.vertices(judged.check(moved, threads)[0])])
-        if not wrong.size:
-            return moved
-        share[np.unique(wrong)] *= 0.5
-        moved = np.where(share < 1, start + share * way, moved)
-    return start

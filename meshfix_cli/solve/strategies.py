@@ -194,7 +194,7 @@ def plan(
         untangling = tuple(region for phase in untangling for region in _in_regions(phase))
     most = smooth if isinstance(smooth, int) else PASSES if smooth == "auto" else MORE_SWEEPS
     if to_reference:
-        return (_FOLLOW, _TO_REFERENCE, *untangling, replace(_APPROACH, max_sweeps=most))
+        return (_FOLLOW, _TO_REFERENCE, _LP_COEFFICIENTS, *untangling, replace(_APPROACH, max_sweeps=most))
     if strategy == "auto" and not only_invalid:
         untangling = (_LAYERS, *untangling, replace(_LAYERS_SMOOTHED, max_sweeps=most))
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), PASSES, until="settled", from_best=True)

@@ -63,6 +63,7 @@ METHODS = {
     "solids": Method(smooth="best"),
     "fewsolids": Method(smooth="best"),
     "quads": Method(smooth="best"),
+    "solidsreference": Method(),
     "layers": Method(),
     "reference": Method(),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import re
@@ -19,8 +20,10 @@ from typing import TYPE_CHECKING, Any
 import meshio
 import numpy as np
 import pytest
+from elements import MESHES
 from numpy.typing import NDArray
 from places import SAMPLES
+from reports import FIRST, built, report_on, tangled
 
 from meshfix_cli import read
 from meshfix_cli.quality.formulas import evaluate
@@ -38,6 +41,7 @@ if TYPE_CHECKING:
 MESHFIX = str(Path(sys.executable).parent / "meshfix")
 TANGLED = {2: SAMPLES / "plate_tangled.vtk", 3: SAMPLES / "bracket_tangled.vtk"}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+EVERY_TYPE = ("quads and triangles", "hex bracket", "every solid")
 HOSTILE = '</title></script><script>window.bad=1</script><img src=x onerror="window.bad=1">'
 
 
@@ -158,6 +162,70 @@ def test_the_worst_elements_are_named_as_the_file_does(written: dict[int, Path],
     assert [(line[0], line[2]) for line in listed] == [(str(document.ids[i]), f"{angles[i]:.3f}") for i in worst]
     for line, centroid in zip(listed, centroids, strict=True):
         np.testing.assert_allclose([float(x) for x in line[5].strip("()").split(",")], centroid, rtol=1e-5, atol=1e-8)
+
+
+@pytest.fixture(scope="module")
+def of_every_type(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Pages of tangled meshes that are not of simplices alone, and of the same as they should be."""
+    folder = tmp_path_factory.mktemp("of_every_type")
+    for name in EVERY_TYPE:
+        report = report_on(tangled(name), built(name), command="untangle")
+        (folder / f"{name}.html").write_text(page(report, figures_of(report), {}), encoding="utf-8")
+    return {name: folder / f"{name}.html" for name in EVERY_TYPE}
+
+
+@pytest.mark.parametrize("name", EVERY_TYPE)
+def test_tables_of_elements_of_every_type(of_every_type: dict[str, Path], name: str) -> None:
+    path, mesh = of_every_type[name], built(name)
+    values = evaluate("scaled_jacobian", mesh)
+    stages = embedded(path, "report")["quality"]
+    table = {label: cells for label, *cells in rows(path, "Quality of each stage")}
+    smallest = [f"{stages[stage]['scaled_jacobian']['smallest']:.3f}" for stage in ("before", "smoothed")]
+    assert table["smallest scaled Jacobian"] == smallest
+    head, *counts = rows(path, "Elements by their scaled Jacobian")
+    assert head == ["scaled Jacobian", "before", "smoothed"]
+    assert [counts[0][0], counts[-1][0], len(counts)] == ["0–0.05", "0.95–1", 20]
+    expected, _ = np.histogram(values, np.linspace(0, 1, 21))
+    assert sum(int(cells[2].replace(",", "")) for cells in counts) == expected.sum() == mesh.topology.m
+    listed = rows(path, "worst elements")[1:]
+    words = {block.element.shape.name: block.rows for block in mesh.topology.blocks}
+    for line, value in zip(listed, np.sort(values), strict=False):
+        word, number = line[0].split()
+        assert int(number) - FIRST in words[word]
+        assert line[2] == f"{value:.3f}" == f"{values[int(number) - FIRST]:.3f}"
+    if len(words) > 1:
+        assert rows(path, "by types of elements")[0][1:] == [one.element.shape.plural for one in mesh.topology.blocks]
+
+
+@pytest.mark.parametrize("name", EVERY_TYPE)
+def test_what_is_drawn_of_elements_of_every_type(of_every_type: dict[str, Path], name: str) -> None:
+    """Each layer has whole elements of its type, whose vertices are there; the boundary has its facets."""
+    scene, (points, cells) = embedded(of_every_type[name], "scene"), MESHES[name]()
+    nodes = {"line": 2, "triangle": 3, "quad": 4, **{key: block.shape[1] for key, block in cells}}
+    drawn: dict[str, set[str]] = {}
+    for layer in scene["layers"]:
+        packed = scene["rows"][layer["rows"]]
+        numbers = np.frombuffer(base64.b64decode(packed["data"]), "<u4" if packed["wide"] else "<u2")
+        coordinates = np.frombuffer(base64.b64decode(scene["points"][layer["points"]]), "<f4")
+        assert scene["shapes"][layer["shape"]]["corners"] == nodes[layer["shape"]]
+        assert len(numbers) % nodes[layer["shape"]] == 0
+        assert numbers.max() < len(coordinates) / points.shape[1]
+        drawn.setdefault(layer["role"], set()).add(layer["shape"])
+    assert drawn["inverted"] == {key for key, _ in cells}
+    assert drawn["boundary"] <= ({"line"} if points.shape[1] == 2 else {"triangle", "quad"})
+    assert drawn.get("cells", drawn["inverted"]) == {key for key, _ in cells}
+
+
+@pytest.mark.parametrize("name", EVERY_TYPE)
+def test_a_browser_draws_elements_of_every_type(visit: Open, of_every_type: dict[str, Path], name: str) -> None:
+    with visit(of_every_type[name]) as tab:
+        before, after = settled(tab), stage(tab, "smoothed")
+        tab.get_by_role("button", name="Show").first.click()
+        closer = settled(tab)
+        number = rows(of_every_type[name], "worst elements")[1][0]
+        assert tab.locator("#drawn").inner_text() == f"smoothed: 0 inverted elements; in the middle {number}"
+    assert red(before).sum() > 4_000 > 50 > red(after).sum()
+    assert amber(closer).sum() > amber(after).sum() > 50
 
 
 def test_options_and_versions_are_there(tmp_path: Path) -> None:

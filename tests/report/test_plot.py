@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 from places import SAMPLES
+from reports import built, report_on
 
 from meshfix_cli.cli import main
+from meshfix_cli.report.figures import figures
+from meshfix_cli.report.plot import plot
 
 TANGLED = str(SAMPLES / "plate_tangled.vtk")
 START = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
@@ -54,6 +59,20 @@ def test_other_commands_and_solids(command: str, sample: str, tmp_path: Path) ->
     done = run(command, "-q", "--plot", tmp_path / "p.svg", SAMPLES / sample, *more)
     assert done.exit_code == (3 if command == "quality" and "tangled" in sample else 0)
     assert b"</svg>" in (tmp_path / "p.svg").read_bytes()
+
+
+@pytest.mark.parametrize("name", ["quad plate", "quads and triangles", "hexes beside tets"])
+def test_elements_of_every_type(name: str, tmp_path: Path) -> None:
+    """Each element of a plane mesh is a polygon of its corners, which ends where it begins."""
+    pytest.importorskip("matplotlib")
+    report = report_on(built(name))
+    plot(report, figures(report), tmp_path / "p.svg")
+    text = (tmp_path / "p.svg").read_text()
+    assert "scaled Jacobian" in text
+    outlines = re.findall(r' d="M [-\d. ]+((?:\s+L [-\d. ]+)+)z\s*" clip-path="[^"]*" style="fill: none', text)
+    corners = Counter(one.count("L") for one in outlines)
+    blocks = report.mesh.topology.blocks if report.mesh.dimension == 2 else ()
+    assert corners == {block.element.nodes: len(block.rows) for block in blocks}
 
 
 def test_what_is_missing_is_named_before_any_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,8 +13,8 @@ Uint8 = NDArray[np.uint8]
 BUILD: str  # what processors these are for
 DUE: int
 SHAPES: list[
-    tuple[int, int, list[list[int]], list[list[int]], list[int], float, list[list[float]]]
-]  # by code: dimension, number of nodes, corner simplices, facets, order of the mirrored, weight, inverse Gram matrix
+    tuple[int, int, list[list[int]], list[list[int]], list[int], float]
+]  # by code: dimension, number of nodes, corner simplices, facets, order of the mirrored, weight
 BLOCK_SIZE: int  # block b holds the vertices from b * BLOCK_SIZE on
 
 class Connectivity:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.solve.records import SweepRecord
-from meshfix_cli.solve.shape import Goal, shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, Goal, shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
 
 if TYPE_CHECKING:
@@ -320,7 +320,7 @@ class Run:
         aims = Goal(goal, floor, max(self.min_measure, 0.0))
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
-            yield shaped(points, stars, free, aims, self.threads)
+            yield shaped(points, stars, free, aims, self.threads, FEW_ITERATIONS if phase.elements else ITERATIONS)
 
         yield from self.team.of_whole(compute, self.points, self._smoothed(phase))
 

@@ -13,7 +13,8 @@ from meshfix_cli.solve.region import Region
 
 Array = NDArray[np.float64]
 
-ITERATIONS = 100
+ITERATIONS = 100  # of "best"
+FEW_ITERATIONS = 20  # of the default
 WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
 
 
@@ -42,6 +43,7 @@ def shaped(
     free: NDArray[np.bool_],
     goal: Goal,
     threads: int,
+    iterations: int = ITERATIONS,
 ) -> Array:
     """Return the points (n, d) with the free ones (n,) where mean ratios and smallest angles are best together.
 
@@ -55,12 +57,14 @@ def shaped(
     goal : Goal
     threads : int
         The points have the same bits for any number.
+    iterations : int
+        At most.
     """
     region = Region(mesh, free)
     moved = points.copy()
     moved[region.moving] = kernels.shaped(
         points[region.vertices], region.simplices, _corners(mesh, region), len(region.moving), goal.angle, goal.floor,
-        goal.measure, WEIGHT, ITERATIONS, threads,
+        goal.measure, WEIGHT, iterations, threads,
     )  # fmt: skip
     return region.retreated(points, moved, goal.measure, threads)
 

@@ -85,7 +85,7 @@ def test_what_is_inverted_inside_alone_goes_back_on_its_way() -> None:
     share = np.linalg.norm(found - CUBE, axis=1) / np.linalg.norm(HOURGLASS - CUBE, axis=1)
     assert share == pytest.approx(share[0])
     before = CUBE + 2 * share[0] * (HOURGLASS - CUBE)
-    assert jacobians(before, "hexahedron", np.arange(8)[None]).min() <= 0
+    assert jacobians(before, "hexahedron", np.arange(8, dtype=np.int32)[None]).min() <= 0
     assert region.retreated(CUBE, found, -np.inf, 1) is found
     mirrored = CUBE[[0, 3, 2, 1, 4, 7, 6, 5]]
     assert region.retreated(CUBE, mirrored, 1.0, 1) is CUBE

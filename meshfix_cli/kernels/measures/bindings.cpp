@@ -126,21 +126,18 @@ auto coefficient_columns_py(const Matrix<const double>& rows, std::uint8_t code,
     return std::make_pair(to_numpy(std::move(values)), to_numpy(std::move(gradients), rows.shape(1)));
 }
 
-// The table of shapes.hpp: dimension, nodes, simplices, facets, the mirrored order, weight and the inverse Gram matrix.
+// The table of shapes.hpp: dimension, nodes, simplices, facets, the mirrored order and the weight.
 auto shapes_py() {
     using Rows = std::vector<std::vector<int>>;
-    std::vector<std::tuple<int, int, Rows, Rows, std::vector<int>, double, std::vector<std::vector<double>>>> table;
+    std::vector<std::tuple<int, int, Rows, Rows, std::vector<int>, double>> table;
     for (const ElementShape& shape : SHAPES) {
         Rows simplices, facets;
         for (int c = 0; c < shape.simplices; ++c)
             simplices.emplace_back(shape.simplex[c].begin(), shape.simplex[c].begin() + shape.dimension + 1);
         for (int k = 0; k < shape.facets; ++k)
             facets.emplace_back(shape.facet[k].begin(), shape.facet[k].begin() + shape.facet_size(k));
-        std::vector<std::vector<double>> gram;
-        for (int i = 0; i < shape.dimension; ++i)
-            gram.emplace_back(shape.gram[i].begin(), shape.gram[i].begin() + shape.dimension);
         const std::vector<int> mirrored(shape.mirrored.begin(), shape.mirrored.begin() + shape.nodes);
-        table.emplace_back(shape.dimension, shape.nodes, simplices, facets, mirrored, shape.weight, gram);
+        table.emplace_back(shape.dimension, shape.nodes, simplices, facets, mirrored, shape.weight);
     }
     return table;
 }

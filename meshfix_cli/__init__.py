@@ -1,4 +1,4 @@
-"""Repairs tangled triangle and tetrahedral meshes by moving interior vertices.
+"""Repairs tangled meshes by moving interior vertices.
 
 >>> from meshfix_cli import read, untangle, write
 >>> document = read("tangled.vtk")

@@ -26,7 +26,7 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
 @click.group(
     cls=Group,
     commands=Commands(),
-    short_help="Repair tangled triangle and tetrahedral meshes.",
+    short_help="Repair tangled meshes of linear elements.",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.option(
@@ -38,7 +38,7 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
     help="Show the version, and what it runs with.",
 )
 def main() -> None:
-    """Repair tangled triangle and tetrahedral meshes by moving interior vertices.
+    """Repair tangled meshes of linear elements, plane or solid, by moving interior vertices.
 
     INPUT and OUTPUT are files, or - for stdin and stdout; a .pvtu stands for its pieces, and 'mesh_*.msh', in quotes,
     for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (OUTPUT, or a file beside it, was not written),

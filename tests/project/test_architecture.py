@@ -23,7 +23,7 @@ ROOMS: dict[str, set[str]] = {
     "cli": {"errors", "kernels", "mesh", "meshfile", "quality", "repair", "report", "solve", "workers"},
     "workers": {"errors", "kernels", "mesh", "meshfile", "quality", "repair", "report", "solve"},
     "repair": {"errors", "mesh", "meshfile", "quality", "report", "solve"},
-    "report": {"errors", "kernels", "mesh", "quality", "solve"},
+    "report": {"errors", "mesh", "quality", "solve"},
     "solve": {"kernels", "mesh", "quality"},
     "quality": {"kernels", "mesh"},
     "meshfile": {"errors", "kernels", "mesh"},

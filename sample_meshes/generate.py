@@ -8,10 +8,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from building import stacked
+from building import Blocks, box, inner_vertices, quads, scattered, stacked
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.solve.perturb import perturb
 
@@ -119,29 +120,36 @@ def _neighbour_means(points: Points, triangles: Simplices) -> Points:
     return sums / counts[:, None]
 
 
-def _write_vtk(path: Path, points: Points, cells: Simplices, title: str) -> None:
-    kind = {3: 5, 4: 10}[cells.shape[1]]
+def _write_vtk(path: Path, points: Points, cells: Blocks, title: str) -> None:
     spatial = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
     lines = ["# vtk DataFile Version 2.0", title, "ASCII", "DATASET UNSTRUCTURED_GRID"]
     lines += [f"POINTS {len(points)} double", *_rows(spatial)]
-    lines += [f"CELLS {len(cells)} {cells.size + len(cells)}"]
-    lines += [f"{cells.shape[1]} {row}" for row in _rows(cells)]
-    lines += [f"CELL_TYPES {len(cells)}", *[str(kind)] * len(cells)]
+    rows = [f"{elements.shape[1]} {row}" for _, elements in cells for row in _rows(elements)]
+    lines += [f"CELLS {len(rows)} {sum(elements.size for _, elements in cells) + len(rows)}", *rows]
+    lines += [f"CELL_TYPES {len(rows)}", *[str(ELEMENTS[key].vtk) for key, elements in cells for _ in elements]]
     path.write_text("\n".join(lines) + "\n")
 
 
 def _write_msh(
-    path: Path, points: Points, tets: Simplices, groups: NDArray[np.int64], names: list[str], title: str
+    path: Path, points: Points, cells: Blocks, groups: NDArray[np.int64], names: list[str], title: str
 ) -> None:
-    """gmsh 2.2 ASCII, with a physical group of each tetrahedron (groups count from 1)."""
+    """gmsh 2.2 ASCII, with a physical group of each element (groups count from 1)."""
     lines = ["$Comments", title, "$EndComments", "$MeshFormat", "2.2 0 8", "$EndMeshFormat"]
     lines += ["$PhysicalNames", str(len(names))]
     lines += [f'3 {k + 1} "{name}"' for k, name in enumerate(names)]
     lines += ["$EndPhysicalNames", "$Nodes", str(len(points))]
     lines += [f"{k + 1} {row}" for k, row in enumerate(_rows(points))]
-    lines += ["$EndNodes", "$Elements", str(len(tets))]
-    lines += [f"{k + 1} 4 2 {groups[k]} {groups[k]} {row}" for k, row in enumerate(_rows(tets + 1))]
+    rows = [(ELEMENTS[key].gmsh, row) for key, elements in cells for row in _rows(elements + 1)]
+    lines += ["$EndNodes", "$Elements", str(len(rows))]
+    lines += [f"{k + 1} {kind} 2 {groups[k]} {groups[k]} {row}" for k, (kind, row) in enumerate(rows)]
     path.write_text("\n".join([*lines, "$EndElements"]) + "\n")
+
+
+def _write_inp(path: Path, points: Points, hexahedra: Simplices, name: str, title: str) -> None:
+    lines = ["*HEADING", title, "*NODE", *[f"{k + 1}, {row}" for k, row in enumerate(_rows(points, ", "))]]
+    lines += [f"*ELEMENT, TYPE=C3D8, ELSET={name}"]
+    lines += [f"{k + 1}, {row}" for k, row in enumerate(_rows(hexahedra + 1, ", "))]
+    path.write_text("\n".join(lines) + "\n")
 
 
 def _write_obj(path: Path, points: Points, triangles: Simplices, title: str) -> None:
@@ -150,8 +158,8 @@ def _write_obj(path: Path, points: Points, triangles: Simplices, title: str) -> 
     path.write_text("\n".join(lines) + "\n")
 
 
-def _rows(array: NDArray[np.generic]) -> list[str]:
-    return [" ".join(map(str, row)) for row in array.tolist()]
+def _rows(array: NDArray[np.generic], between: str = " ") -> list[str]:
+    return [between.join(map(str, row)) for row in array.tolist()]
 
 
 def _tangled(points: Points, cells: Simplices, percent: float, distance: float) -> Points:
@@ -159,17 +167,21 @@ def _tangled(points: Points, cells: Simplices, percent: float, distance: float) 
     return perturb(mesh, percent, distance * mesh.mean_edge_length(), seed=1)[0].points
 
 
+def _scattered(points: Points, cells: Blocks, percent: float, distance: float) -> Points:
+    return scattered(points, inner_vertices(len(points), cells), percent, distance, seed=1).round(6)
+
+
 def main() -> None:
     """Write every sample."""
     folder = Path(__file__).parent
     points, triangles = plate(0.18)
     points = points.round(6)
-    _write_vtk(folder / "plate.vtk", points, triangles, "plate with two holes, by generate.py")
+    _write_vtk(folder / "plate.vtk", points, [("triangle", triangles)], "plate with two holes, by generate.py")
     tangled, title = _tangled(points, triangles, 25, 2), "plate.vtk with 25 percent moved by 2h, by generate.py"
     _write_vtk(
         folder / "plate_tangled.vtk",
         tangled.round(6),
-        triangles,
+        [("triangle", triangles)],
         title,
     )
     _write_obj(
@@ -180,16 +192,38 @@ def main() -> None:
     )
     points, tets = bracket(0.18, 8)
     points = points.round(6)
-    _write_vtk(folder / "bracket.vtk", points, tets, "bent bracket with two holes, by generate.py")
+    _write_vtk(folder / "bracket.vtk", points, [("tetra", tets)], "bent bracket with two holes, by generate.py")
     tangled, title = _tangled(points, tets, 10, 1), "bracket.vtk with 10 percent moved by h, by generate.py"
-    _write_vtk(folder / "bracket_tangled.vtk", tangled.round(6), tets, title)
+    _write_vtk(folder / "bracket_tangled.vtk", tangled.round(6), [("tetra", tets)], title)
     points, tets = bracket(0.25, 6, angle=0.0)
     groups = 1 + (points[tets].mean(axis=1)[:, 2] > points[:, 2].max() / 2).astype(np.int64)
     tangled = _tangled(points.round(6), tets, 10, 1)
     interface = np.isin(np.arange(len(points)), tets[groups == 1]) & np.isin(np.arange(len(points)), tets[groups == 2])
     tangled = np.where(interface[:, None], points, tangled)
     title = "flat plate of two materials, by generate.py, 10 percent moved by h but for the interface"
-    _write_msh(folder / "two_materials.msh", tangled.round(6), tets, groups, ["steel", "copper"], title)
+    _write_msh(folder / "two_materials.msh", tangled.round(6), [("tetra", tets)], groups, ["steel", "copper"], title)
+    _write_other_elements(folder)
+
+
+def _write_other_elements(folder: Path) -> None:
+    """Write samples of quads, of hexahedra, and of hexahedra, pyramids and tetrahedra."""
+    points, cells = quads(*plate(0.25))
+    tangled = _scattered(points, [("quad", cells)], 25, 0.3)
+    title = "plate of quads with two holes, by generate.py, 25 percent moved by 0.3"
+    _write_vtk(folder / "quads_tangled.vtk", tangled, [("quad", cells)], title)
+    points, cells = stacked(*quads(*plate(0.4)), np.linspace(0.0, 0.8, 5))
+    points = bent(points, 1.2)
+    tangled = _scattered(points, [("hexahedron", cells)], 10, 0.3)
+    title = "bent bracket of hexahedra with two holes, by generate.py, 10 percent moved by 0.3"
+    _write_inp(folder / "hexes_tangled.inp", tangled, cells, "BRACKET", title)
+    kinds = np.full((6, 4, 5), "hexahedron")
+    kinds[:, :, 2], kinds[:, :, 3:] = "pyramid", "tetra"
+    points, blocks = box(kinds, *(np.linspace(0.0, 0.5 * count, count + 1) for count in kinds.shape))
+    points = bent(points, 1.2)
+    tangled = _scattered(points, blocks, 10, 1.0)
+    groups = np.ones(sum(len(rows) for _, rows in blocks), dtype=np.int64)
+    title = "bent block of hexahedra, pyramids and tetrahedra, by generate.py, 10 percent moved by 1"
+    _write_msh(folder / "mixed_tangled.msh", tangled, blocks, groups, ["block"], title)
 
 
 if __name__ == "__main__":

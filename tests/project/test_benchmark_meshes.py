@@ -6,10 +6,12 @@ from collections import Counter
 from functools import cache
 
 import generate
+import meshio
 import numpy as np
 import pytest
 from building import Blocks, Points, inner_vertices
 from elements import HOLES, MESHES, box_of_hexahedra, box_of_wedges_and_tets, tangles
+from places import SAMPLES
 from sampling import WEIGHTS, jacobians, measure, places
 
 from meshfix_cli.mesh.elements import ELEMENTS
@@ -181,6 +183,28 @@ def test_a_turned_hole_has_a_valid_mesh_around_it(name: str) -> None:
     solution[:, :2] = middle[:2] + np.column_stack([around.real, around.imag])
     np.testing.assert_allclose(solution[~free], target[~free], atol=1e-12)
     assert all((jacobians(solution, key, rows) > 0).all() for key, rows in cells)
+
+
+@pytest.mark.parametrize(
+    ("sample", "types"),
+    [
+        ("quads_tangled.vtk", {"quad"}),
+        ("hexes_tangled.inp", {"hexahedron"}),
+        ("mixed_tangled.msh", {"hexahedron", "pyramid", "tetra"}),
+    ],
+)
+def test_in_samples_some_of_each_type_are_inverted_and_all_can_be_moved(sample: str, types: set[str]) -> None:
+    """As meshio reads them."""
+    mesh = meshio.read(SAMPLES / sample)
+    dimension = 2 if types == {"quad"} else 3
+    points, cells = mesh.points[:, :dimension], [(block.type, block.data.astype(np.int32)) for block in mesh.cells]
+    assert {key for key, _ in cells} == types
+    free = inner_vertices(len(points), cells)
+    for key, rows in cells:
+        valid = (jacobians(points, key, rows) > 0).all(axis=1)
+        assert 0.03 < (~valid).mean() < 0.9
+        assert free[rows[~valid]].any(axis=1).all()
+    assert (SAMPLES / sample).stat().st_size < 1e5
 
 
 @pytest.mark.parametrize("key", WEIGHTS)

@@ -65,7 +65,7 @@ def test_samples_are_what_the_script_makes(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(generate, "__file__", str(tmp_path / "generate.py"))
     generate.main()
     made = sorted(p.name for p in tmp_path.iterdir())
-    assert made == sorted(p.name for p in SAMPLES.iterdir() if p.suffix in (".vtk", ".msh", ".obj"))
+    assert made == sorted(p.name for p in SAMPLES.iterdir() if p.suffix in (".vtk", ".msh", ".obj", ".inp"))
     assert all(b"by generate.py" in (SAMPLES / name).read_bytes() for name in made)
     total = sum((SAMPLES / name).stat().st_size for name in made)
     assert total < 3e6

@@ -3,7 +3,8 @@
 Every case starts from a mesh that is valid by construction, so it has a solution, but for those of the family
 "impossible". A case is solved where no element is inverted and no facet folded, and the fixed vertices have not
 moved; the exit code is 1 where one fails, or where success is reported wrongly. A result is poor where its smallest
-angle is below half of that of the mesh before it was tangled.
+quality is below half of that of the mesh before it was tangled. Quality is the smallest angle of an element in degrees,
+and its scaled Jacobian where elements are not all simplices.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from elements import MESHES, tangles
 from geometries import (
     GEOMETRIES,
     Points,
@@ -35,6 +37,7 @@ from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli import Mesh, perturb, summarise, untangle
+from meshfix_cli.quality.summary import Summary
 from meshfix_cli.solve.strategies import SMOOTH, STRATEGIES, Smooth
 
 PERTURBATIONS = ((5, 1), (10, 1), (25, 1), (50, 2), (100, 1), (25, 8), (100, 8), (100, 32), (100, 100))
@@ -45,29 +48,34 @@ Map = Callable[[Points], Points]
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A tangled mesh, and the smallest angle in degrees that it had before; `possible`: it has a valid solution."""
+    """A tangled mesh, and the smallest quality that it had before; `possible`: it has a valid solution."""
 
     family: str
     name: str
     mesh: Mesh
-    angle: float
+    before: float
     possible: bool = True
 
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a case; angles in degrees."""
+    """What became of a case; the smallest and the mean quality of the elements."""
 
     case: Case
     verdict: str
     seconds: float
-    min_angle: float
-    mean_angle: float
+    smallest: float
+    mean: float
 
     @property
     def poor(self) -> bool:
-        """Whether the smallest angle is below half of what it was."""
-        return self.case.possible and self.min_angle < 0.5 * self.case.angle
+        """Whether the smallest quality is below half of what it was."""
+        return self.case.possible and self.smallest < 0.5 * self.case.before
+
+    @property
+    def unit(self) -> str:
+        """That of its quality."""
+        return "°" if self.case.mesh.topology.simplicial else ""
 
 
 def cases(seed: int = 0) -> Iterator[Case]:
@@ -78,14 +86,15 @@ def cases(seed: int = 0) -> Iterator[Case]:
     yield from _two_materials(seed)
     yield from _curves(seed)
     yield from _morphed()
+    yield from _elements(seed)
     yield from _impossible()
 
 
 def _tangled(family: str, mesh: Mesh, seed: int) -> Iterator[Case]:
     h, free, random = mesh.mean_edge_length(), mesh.movable, np.random.default_rng(seed)
-    angle = summarise(mesh).min_angle
+    before = summarise(mesh).min_angle
     for percent, distance in PERTURBATIONS:
-        yield Case(family, f"P={percent} D={distance}h", perturb(mesh, percent, distance * h, seed)[0], angle)
+        yield Case(family, f"P={percent} D={distance}h", perturb(mesh, percent, distance * h, seed)[0], before)
     low, high, inner = mesh.points.min(axis=0), mesh.points.max(axis=0), mesh.points[free]
     starts = {
         "random": random.uniform(low, high, inner.shape),
@@ -98,7 +107,7 @@ def _tangled(family: str, mesh: Mesh, seed: int) -> Iterator[Case]:
     for name, positions in starts.items():
         points = mesh.points.copy()
         points[free] = positions
-        yield Case(family, name, mesh.with_points(points), angle)
+        yield Case(family, name, mesh.with_points(points), before)
 
 
 def _turned_over(points: Points, centre: NDArray[np.float64], radius: float) -> Points:
@@ -146,11 +155,11 @@ def _morphed() -> Iterator[Case]:
             target = moved(mesh.points)
             if mesh.with_points(target.copy()).check()[0]:
                 raise ValueError(f"{family}, {name} {how}: the map itself tangles the mesh")
-            points, angle = (
+            points, before = (
                 np.where(mesh.movable[:, None], mesh.points, target),
                 summarise(mesh.with_points(target)).min_angle,
             )
-            yield Case(family, f"{name} {how}", Mesh.build(points, mesh.topology.simplices), angle)
+            yield Case(family, f"{name} {how}", Mesh.build(points, mesh.topology.simplices), before)
 
 
 def _turned(points: Points, angle: NDArray[np.float64], centre: float = 0.0) -> Points:
@@ -191,6 +200,18 @@ def _squeezed(factor: float) -> Map:
     return lambda p: p * np.array([1.0] * (p.shape[1] - 1) + [factor])
 
 
+def _elements(seed: int) -> Iterator[Case]:
+    """Yield tangles of the meshes of other elements than simplices, by the rarest type that stands in them."""
+    families = {"pyramid": "pyramids", "wedge": "wedges", "hexahedron": "hexahedra", "quad": "quads"}
+    for name, make in MESHES.items():
+        points, blocks = make()
+        family = next(families[key] for key in families if key in dict(blocks))
+        mesh = Mesh.build(points, blocks)
+        before, _ = _quality(summarise(mesh))
+        for how, moved in tangles(name, mesh.points, mesh.movable, mesh.mean_edge_length(), seed).items():
+            yield Case(family, f"{name}: {how}", mesh.with_points(moved), before)
+
+
 def _impossible() -> Iterator[Case]:
     """Yield meshes that no motion of the free vertices makes valid."""
     for name in ("plate with holes", "box with pipes"):
@@ -204,6 +225,13 @@ def _impossible() -> Iterator[Case]:
         hole = np.linalg.norm(points[:, :2] - np.array([0.8, 1.25]), axis=1) < 0.36
         points[hole & ~mesh.movable, 1] += 0.5
         yield Case("impossible", f"{name}: a hole across the rim", mesh.with_points(points), 0.0, possible=False)
+
+
+def _quality(summary: Summary) -> tuple[float, float]:
+    """Return the smallest and the mean quality of the elements."""
+    if summary.jacobians is not None:
+        return summary.jacobians.smallest, summary.jacobians.mean
+    return summary.min_angle, summary.mean_min_angle
 
 
 def run(case: Case, strategy: str, smooth: Smooth = SMOOTH, threads: int = 1) -> Result:
@@ -221,34 +249,38 @@ def run(case: Case, strategy: str, smooth: Smooth = SMOOTH, threads: int = 1) ->
         verdict = SOLVED
     else:
         verdict = IMPOSSIBLE if outcome.obstacles and not case.possible else FAILED
-    return Result(case, verdict, seconds, summary.min_angle, summary.mean_min_angle)
+    return Result(case, verdict, seconds, *_quality(summary))
 
 
 def print_results(results: list[Result], console: Console) -> None:
     """Print a line for each family, then whatever failed."""
     verdicts = (SOLVED, IMPOSSIBLE, FAILED, WRONG)
-    columns = ("family", "cases", *verdicts, "poor", "seconds", "longest", "smallest angle", "mean angle")
-    table = Table(
-        *columns, title="angles: the worst case's smallest, the mean over the cases of the elements' smallest"
-    )
+    columns = ("family", "cases", *verdicts, "poor", "seconds", "longest", "smallest", "mean")
+    table = Table(*columns, title="the worst case's smallest angle or scaled Jacobian; the mean of the cases' means")
     families = list(dict.fromkeys(result.case.family for result in results))
     for family in [*families, ""]:
         rows = [result for result in results if family in ("", result.case.family)]
-        solved = [result for result in rows if result.verdict == SOLVED] or rows
         counts = [sum(result.verdict == verdict for result in rows) for verdict in verdicts]
         counts.append(sum(result.poor for result in rows))
         times = [result.seconds for result in rows]
         table.add_row(
             family or "all", str(len(rows)), *map(str, counts), f"{sum(times):.2f}", f"{max(times):.2f}",
-            f"{min(result.min_angle for result in solved):.3f}",
-            f"{sum(result.mean_angle for result in solved) / len(solved):.2f}", end_section=family == families[-1],
+            *_worst_and_mean([result for result in rows if result.verdict == SOLVED] or rows),
+            end_section=family == families[-1],
         )  # fmt: skip
     console.print(table)
     for result in results:
         if result.verdict in (FAILED, WRONG) or result.poor:
-            angles = f"{result.min_angle:.4g}° of {result.case.angle:.4g}°"
+            quality = f"{result.smallest:.4g}{result.unit} of {result.case.before:.4g}{result.unit}"
             verdict = "poor" if result.verdict == SOLVED else result.verdict
-            console.print(f"{verdict}: {result.case.family}, {result.case.name}: {angles}")
+            console.print(f"{verdict}: {result.case.family}, {result.case.name}: {quality}")
+
+
+def _worst_and_mean(results: list[Result]) -> tuple[str, str]:
+    """Return the smallest quality of all and the mean of the means; nothing where they differ in their measure."""
+    unit, *others = {result.unit for result in results}
+    smallest, mean = min(result.smallest for result in results), sum(result.mean for result in results) / len(results)
+    return ("", "") if others else (f"{smallest:.3f}{unit}", f"{mean:.{2 if unit else 3}f}{unit}")
 
 
 def main() -> None:
@@ -263,7 +295,7 @@ def main() -> None:
     print_results(results, Console(width=120))
     if options.output is not None:
         lines = [
-            f"{r.case.family},{r.case.name},{r.verdict},{r.seconds:.4f},{r.min_angle:.4f},{r.mean_angle:.3f},{r.case.angle:.4f}"
+            f"{r.case.family},{r.case.name},{r.verdict},{r.seconds:.4f},{r.smallest:.4f},{r.mean:.3f},{r.case.before:.4f}"
             for r in results
         ]
         options.output.write_text("\n".join(["family,case,verdict,seconds,smallest,mean,before", *lines]) + "\n")

@@ -350,7 +350,8 @@ def _impossible(report: Report) -> Iterator[str]:
     found = report.obstacles
     if count := len(found.inverted):
         which = _some(report, found.inverted)
-        yield f"IMPOSSIBLE: {count:,} of them without a free vertex: the fixed ones are wrong ({which})"
+        where = "without" if report.mesh.topology.simplicial else "at corners without"
+        yield f"IMPOSSIBLE: {count:,} of them {where} a free vertex: the fixed ones are wrong ({which})"
     if count := len(found.exclusive):  # at least two
         yield (
             f"IMPOSSIBLE: {count:,} elements exclude each other: wherever the free vertex that they share goes, one of "

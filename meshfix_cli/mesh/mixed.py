@@ -44,6 +44,11 @@ class MixedTopology(Topology):
             blocks.append(Block(JUDGED[code], read_only(mesh.rows[here]), read_only(mesh.vertices[nodes])))
         return tuple(blocks)
 
+    @property
+    def simplices(self) -> NDArray[np.int32]:
+        """There are none: AttributeError; `blocks` are the elements."""
+        raise AttributeError("a mesh of elements of any types has no simplices; see `blocks`")
+
     @cached_property
     def facets(self) -> NDArray[np.int32]:
         """(f, 4) int32: the vertices of each facet in the numbers of the connectivity, from outside; -1: no more."""

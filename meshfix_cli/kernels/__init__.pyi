@@ -70,12 +70,14 @@ class Connectivity:
         """
 
     @property
-    def codes(self) -> Uint8:
-        """Empty where all elements are simplices of one type; then what follows is empty, too.
+    def simplicial(self) -> bool:
+        """Whether all elements are simplices of one type; what follows, up to `owners`, is empty then.
 
-        A part of a mesh of others may have no elements: it has offsets nevertheless.
+        A part of a mesh of others may have no elements.
         """
 
+    @property
+    def codes(self) -> Uint8: ...
     @property
     def node_offsets(self) -> Int32: ...
     @property

@@ -46,7 +46,7 @@ class Judged:
     @property
     def simplicial(self) -> bool:
         """Whether all elements of the mesh are simplices of one type."""
-        return not len(self._mesh.node_offsets)
+        return self._mesh.simplicial
 
     def without(self, positions: NDArray[np.integer]) -> Judged:
         """Return the others."""
@@ -63,27 +63,25 @@ class Judged:
         """Return the positions of inverted elements, and the smallest signed measure of a corner simplex."""
         inverted, smallest = kernels.check(points, self.simplices, threads)
         if not self.simplicial:
-            inverted = np.flatnonzero(self.verdicts(points, threads)).astype(np.int32)
+            inverted = np.flatnonzero(self.judge(points, threads)[0]).astype(np.int32)
         return inverted, smallest
 
-    def verdicts(self, points: Array, threads: int) -> NDArray[np.uint8]:
-        """Return VALID, INSIDE or CORNER (k,): where the elements are not valid."""
-        if self.simplicial:
-            valid = kernels.measure(points, self.simplices, threads)[1]
-            return np.where(valid, VALID, CORNER).astype(np.uint8)
-        return self._judge(points, threads)[0]
+    def judge(self, points: Array, threads: int) -> tuple[NDArray[np.uint8], Array, Array]:
+        """Return for each element VALID, or where it is not, INSIDE or CORNER; its signed measure; and its quality.
 
-    def measures(self, points: Array, threads: int) -> Array:
-        """Return the signed areas or volumes (k,), in model units."""
+        Each (k,); measures are areas or volumes in model units, qualities angles in radians.
+        """
         if self.simplicial:
-            return kernels.measure(points, self.simplices, threads)[0]
-        return self._judge(points, threads)[1]
+            measures, valid = kernels.measure(points, self.simplices, threads)
+            return np.where(valid, VALID, CORNER).astype(np.uint8), measures, self.angles(points, threads)
+        verdicts, measures, sines = self._judge(points, threads)
+        return verdicts, measures, _arc_sines(sines)
 
     def angles(self, points: Array, threads: int) -> Array:
         """Return the quality (k,) of each element as an angle in radians."""
         if self.simplicial:
             return kernels.angles(points, self.simplices, threads)[0]
-        return np.arcsin(np.clip(self._judge(points, threads)[2], 0.0, 1.0))
+        return _arc_sines(self._judge(points, threads)[2])
 
     def min_sine2(self, points: Array, threads: int) -> float:
         """Return the smallest sine^2 of the valid ones; 1: there are none."""
@@ -94,6 +92,10 @@ class Judged:
 
     def _judge(self, points: Array, threads: int) -> tuple[NDArray[np.uint8], Array, Array]:
         return kernels.judge(points, self._codes, self._offsets, self._nodes, threads)
+
+
+def _arc_sines(sines: Array) -> Array:
+    return np.arcsin(np.clip(sines, 0.0, 1.0))
 
 
 def _offsets(counts: NDArray[np.integer]) -> NDArray[np.int32]:

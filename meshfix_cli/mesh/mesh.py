@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import SIMPLICES, counted
+from meshfix_cli.mesh.elements import SIMPLICES
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mixed import build_mixed, checked_blocks
-from meshfix_cli.mesh.topology import Topology, build_topology, read_only, rows_of
+from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, read_only, refers_outside, rows_of
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -182,11 +182,9 @@ def _checked_simplices(
     rows = np.ascontiguousarray(small, dtype=np.int32)
     outside, repeated = kernels.check_simplices(rows, n, threads)
     if outside >= 0:
-        named = simplices[outside].tolist()
-        there = f"there {'is' if n == 1 else 'are'} {counted(n, 'point', 'points')}"
-        raise InvalidMeshError(f"element {outside} refers to vertices {named}, but {there}")
+        raise refers_outside(outside, simplices[outside], n)
     if repeated >= 0:
-        raise InvalidMeshError(f"element {repeated} names a vertex twice: {simplices[repeated].tolist()}")
+        raise names_twice(repeated, simplices[repeated])
     return rows
 
 

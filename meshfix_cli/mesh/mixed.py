@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, MIXED, Element, counted
-from meshfix_cli.mesh.topology import Block, Topology, crowded_facet, moebius, read_only
+from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, MIXED, Element
+from meshfix_cli.mesh.topology import Block, Topology, crowded_facet, moebius, names_twice, read_only, refers_outside
 
 Blocks = Sequence[tuple[Element, NDArray[np.int32]]]
 WIDTH = 4  # vertices of the largest facets
@@ -133,13 +133,12 @@ def checked_blocks(cells: Sequence[tuple[str, ArrayLike]], n: int, dimension: in
         outside = ((rows < 0) | (rows >= n)).any(axis=1)
         if outside.any():
             first = int(np.argmax(outside))
-            there = f"there {'is' if n == 1 else 'are'} {counted(n, 'point', 'points')}"
-            raise InvalidMeshError(f"element {before + first} refers to vertices {rows[first].tolist()}, but {there}")
+            raise refers_outside(before + first, rows[first], n)
         ordered = np.sort(rows, axis=1)
         repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
         if repeated.any():
             first = int(np.argmax(repeated))
-            raise InvalidMeshError(f"element {before + first} names a vertex twice: {rows[first].tolist()}")
+            raise names_twice(before + first, rows[first])
         blocks.append((element, np.ascontiguousarray(rows, dtype=np.int32)))
         before += len(rows)
     if before == 0:

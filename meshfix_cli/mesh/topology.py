@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import SIMPLICES, Element, Shape
+from meshfix_cli.mesh.elements import SIMPLICES, Element, Shape, counted
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -84,7 +84,7 @@ class Topology:
     @property
     def simplicial(self) -> bool:
         """Whether all elements are simplices of one type."""
-        return not len(self.connectivity.node_offsets)
+        return self.connectivity.simplicial
 
     @property
     def element(self) -> Element:
@@ -267,6 +267,17 @@ def read_only(array: NDArray[_T]) -> NDArray[_T]:
     """Return the array, which cannot be written to any more."""
     array.flags.writeable = False
     return array
+
+
+def refers_outside(row: int, vertices: NDArray[np.integer], n: int) -> InvalidMeshError:
+    """Return the complaint about an element of vertices that are not among the n points."""
+    there = f"there {'is' if n == 1 else 'are'} {counted(n, 'point', 'points')}"
+    return InvalidMeshError(f"element {row} refers to vertices {vertices.tolist()}, but {there}")
+
+
+def names_twice(row: int, vertices: NDArray[np.integer]) -> InvalidMeshError:
+    """Return the complaint about an element that has a vertex twice."""
+    return InvalidMeshError(f"element {row} names a vertex twice: {vertices.tolist()}")
 
 
 def crowded_facet(shape: Shape, facet: list[int]) -> InvalidMeshError:

@@ -43,7 +43,7 @@ def worst_and_mean_to(mesh: Mesh, reference: Array, threads: int = 1) -> tuple[f
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     values = mean_ratios(points, reference, connectivity.simplices)
     if not mesh.topology.simplicial:
-        verdicts = Judged(connectivity).verdicts(points, threads)
+        verdicts = Judged(connectivity).judge(points, threads)[0]
         values = np.minimum.reduceat(values, connectivity.simplex_offsets[:-1])
         values[verdicts != VALID] = 0.0
     return float(values.min()), float(values.mean())

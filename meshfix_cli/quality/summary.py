@@ -132,8 +132,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
 def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, reference: Array | None) -> Summary:
     """Evaluate a mesh of other elements than simplices of one type."""
     topology, points = mesh.topology, mesh.along_curve(mesh.points)
-    judged = Judged(topology.connectivity)
-    verdicts, measures = judged.verdicts(points, threads), judged.measures(points, threads)
+    verdicts, measures, _ = Judged(topology.connectivity).judge(points, threads)
     jacobians = evaluate("scaled_jacobian", mesh)
     angles = [_angles(block, mesh.points, threads) for block in topology.blocks]
     smallest, largest = (np.concatenate(part) for part in zip(*angles, strict=True))
@@ -191,9 +190,8 @@ def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
 
     Where elements are not all simplices, the scaled Jacobian takes the place of the angle.
     """
-    judged, points = Judged(mesh.topology.connectivity), mesh.along_curve(mesh.points)
-    passes = judged.measures, judged.verdicts, judged.angles
-    measure, verdicts, quality = (mesh.topology.of_rows(evaluated(points, threads)) for evaluated in passes)
+    judged = Judged(mesh.topology.connectivity).judge(mesh.along_curve(mesh.points), threads)
+    verdicts, measure, quality = (mesh.topology.of_rows(values) for values in judged)
     wrong = (verdicts != VALID) | mesh.topology.misnumbered
     simplicial = {"min_angle": np.degrees(quality)} if mesh.topology.simplicial else {}
     other = {} if mesh.topology.simplicial else {"scaled_jacobian": evaluate("scaled_jacobian", mesh)}

@@ -214,10 +214,9 @@ def _worst(report: Report, rows: NDArray[np.int64], inverted_rows: Rows) -> list
     mesh, inverted = report.mesh, np.isin(rows, inverted_rows)
     judged = Judged(mesh.topology.connectivity, mesh.topology.positions[rows])
     points = mesh.along_curve(mesh.points)
-    qualities = np.degrees(judged.angles(points, 1))
-    if not mesh.topology.simplicial:
-        qualities = evaluate("scaled_jacobian", mesh)[rows]
-    measures, middles = judged.measures(points, 1), centroids(report, rows)
+    _, measures, angles = judged.judge(points, 1)
+    qualities = np.degrees(angles) if mesh.topology.simplicial else evaluate("scaled_jacobian", mesh)[rows]
+    middles = centroids(report, rows)
     return [
         Worst(
             id=int(report.ids[row]),

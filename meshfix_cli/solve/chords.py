@@ -28,7 +28,7 @@ def inverse_lengths(points: Array, mesh: kernels.Connectivity, free: NDArray[np.
     free : (n,) bool
         Edges between others keep their lengths, in model units; a row that has none gets the mean of all rows.
     """
-    if not len(mesh.codes):
+    if mesh.simplicial:
         return np.empty(0)
     keys, rows = _rows(mesh)
     one, other = keys >> _CHUNK, keys & (1 << _CHUNK) - 1

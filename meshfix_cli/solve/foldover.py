@@ -182,7 +182,7 @@ class _Region(Region):
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
         super().__init__(mesh, free)
         self.reach, self.threads = reach, threads
-        self.codes = mesh.codes[mesh.owners[self.rows]] if len(mesh.codes) else None
+        self.codes = None if mesh.simplicial else mesh.codes[mesh.owners[self.rows]]
 
     def uniform(self, points: Array) -> Array:
         """Return one target for all (s,): the region's signed measure, which its boundary fixes, in equal parts.

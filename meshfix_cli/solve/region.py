@@ -43,7 +43,7 @@ class Region:
         number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
         self.global_simplices = np.ascontiguousarray(simplices)
         self.simplices = np.ascontiguousarray(number[simplices])
-        self.elements = Judged(mesh, distinct(mesh.owners[self.rows])) if len(mesh.codes) else None
+        self.elements = None if mesh.simplicial else Judged(mesh, distinct(mesh.owners[self.rows]))
 
     def retreated(self, start: Array, moved: Array, least: float, threads: int) -> Array:
         """Return moved points (n, d) where no element of the region is inverted, and none gets very small.

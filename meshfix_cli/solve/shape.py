@@ -72,4 +72,4 @@ def shaped(
 def _corners(mesh: kernels.Connectivity, region: Region) -> Array:
     """Return the weights (s,) of scaled Jacobians, 0 for whole simplices; (0,) where all are."""
     weights = np.array([one.shape.weight if len(one.shape.simplices) > 1 else 0.0 for one in JUDGED])
-    return weights[mesh.codes[mesh.owners[region.rows]]] if len(mesh.codes) else np.empty(0)
+    return np.empty(0) if mesh.simplicial else weights[mesh.codes[mesh.owners[region.rows]]]

@@ -87,7 +87,7 @@ def test_a_type_that_a_file_numbers_the_other_way_throughout_is_a_convention() -
 def test_measures_add_up_and_blocks_are_the_elements(name: str) -> None:
     points, blocks = MESHES[name]()
     mesh = Mesh.build(points, blocks)
-    measures = mesh.topology.of_rows(Judged(mesh.topology.connectivity).measures(mesh.along_curve(points), 1))
+    measures = mesh.topology.of_rows(Judged(mesh.topology.connectivity).judge(mesh.along_curve(points), 1)[1])
     for block in mesh.topology.blocks:
         rows = np.concatenate([rows for key, rows in blocks if key == block.element.key])
         expected = measure(points, block.element.key, rows)
@@ -112,7 +112,7 @@ def test_a_hexahedron_that_is_invalid_inside_only_is_told(random: np.random.Gene
     found = set()
     for _ in range(3000):
         nodes = cube + random.normal(scale=0.3, size=cube.shape)
-        (verdict,) = Judged(connectivity).verdicts(nodes, 1)
+        (verdict,) = Judged(connectivity).judge(nodes, 1)[0]
         found.add(int(verdict))
         if verdict == INSIDE:
             assert (np.linalg.det(_corner_edges(nodes)) > 0).all()

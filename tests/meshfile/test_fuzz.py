@@ -107,7 +107,7 @@ def check(path: Path, data: bytes) -> None:
         assert time.monotonic() - start < SECONDS
     again = read(target)
     for mesh in (document.mesh, again.mesh):
-        sizes = Judged(mesh.topology.connectivity).measures(mesh.along_curve(mesh.points), 1)
+        sizes = Judged(mesh.topology.connectivity).judge(mesh.along_curve(mesh.points), 1)[1]
         if abs(sizes.sum()) < 1e-9 * np.abs(sizes).sum():
             return  # a vertex so far away that rounding tells which orientation is the positive one
     inverted, smallest = again.mesh.check()

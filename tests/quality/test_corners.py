@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ideal import REGULAR
+from isoparametric import REGULAR
 from numpy.typing import NDArray
 from verdict import NAMES, vtk_quality
 

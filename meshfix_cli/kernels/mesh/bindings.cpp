@@ -9,11 +9,14 @@ namespace meshfix {
 
 namespace {
 
+template <class T>
+auto view_of(PyConnectivity& self, const std::vector<T>& values) {
+    return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+}
+
 template <auto Member>
 auto view(PyConnectivity& self) {
-    auto& values = self.mesh.*Member;
-    using T = typename std::remove_reference_t<decltype(values)>::value_type;
-    return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+    return view_of(self, self.mesh.*Member);
 }
 
 template <auto Member>
@@ -54,9 +57,7 @@ void take_apart_py(PyConnectivity& self, const Vector<const bool>& flipped, int 
 
 template <auto Member>
 auto element_view(PyConnectivity& self) {
-    auto& values = self.mesh.elements.*Member;
-    using T = typename std::remove_reference_t<decltype(values)>::value_type;
-    return Vector<const T>(values.data(), {values.size()}, nb::find(self));
+    return view_of(self, self.mesh.elements.*Member);
 }
 
 template <class Array>
@@ -278,6 +279,7 @@ void bind_mesh(nb::module_& m) {
         .def("__init__", &init_elements, "points"_a.noconvert(), "codes"_a.noconvert(), "nodes"_a.noconvert(),
              "used"_a.noconvert(), "threads"_a)
         .def("take_apart", &take_apart_py, "flipped"_a.noconvert(), "threads"_a)
+        .def_prop_ro("simplicial", [](PyConnectivity& self) { return self.mesh.elements.empty(); })
         .def_prop_ro("codes", &element_view<&Elements::codes>)
         .def_prop_ro("node_offsets", &element_view<&Elements::offsets>)
         .def_prop_ro("nodes", &element_view<&Elements::nodes>)

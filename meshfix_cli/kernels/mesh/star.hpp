@@ -99,8 +99,7 @@ struct Star {
             const int lane = i % LANES;
             const auto& face = opposite_face<D>(position_of_free);
             role.weight[lane] = shape.weight;
-            role.corner[lane] = 0.0;
-            if (shape.simplices > 1) role.corner[lane] = position_of_free == 0 ? 1.0 : 0.0;
+            role.corner[lane] = shape.simplices > 1 && position_of_free == 0 ? 1.0 : 0.0;
             for (int k = 0; k < D; ++k)
                 if (shape.simplices > 1 && face[k] == 0) role.corner[lane] = 2.0 + k;
         }

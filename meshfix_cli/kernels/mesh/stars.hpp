@@ -57,6 +57,12 @@ std::vector<std::uint8_t> boundary_vertices(const Connectivity& mesh) {
     return marked;
 }
 
+inline void take_orientation(Connectivity& mesh, Orientation&& orientation) {
+    mesh.component = std::move(orientation.component);
+    mesh.against = std::move(orientation.against);
+    mesh.orientable = orientation.orientable;
+}
+
 template <int D>
 Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
                      std::vector<std::int32_t> used, int threads) {
@@ -71,11 +77,8 @@ Connectivity connect(const double* points, std::int64_t n, const std::int32_t* s
     if (mesh.crowded >= 0) return mesh;
     mesh.offsets = std::move(csr.offsets);
     mesh.corners = std::move(csr.corners);
-    Orientation orientation = orient<D>(facets, m, threads);
+    take_orientation(mesh, orient<D>(facets, m, threads));
     mesh.mates = std::move(facets.mates);
-    mesh.component = std::move(orientation.component);
-    mesh.against = std::move(orientation.against);
-    mesh.orientable = orientation.orientable;
     return mesh;
 }
 
@@ -92,11 +95,8 @@ Connectivity connect_elements(const double* points, std::int64_t n, const std::u
     Facets facets = match_facets(mesh.elements, mesh.n(), threads);
     mesh.crowded = facets.crowded;
     if (mesh.crowded >= 0) return mesh;
-    Orientation orientation = orient(mesh.elements, facets);
+    take_orientation(mesh, orient(mesh.elements, facets));
     mesh.mates = std::move(facets.mates);
-    mesh.component = std::move(orientation.component);
-    mesh.against = std::move(orientation.against);
-    mesh.orientable = orientation.orientable;
     return mesh;
 }
 

@@ -76,8 +76,10 @@ struct Relocation {
         if constexpr (D == 2) return x;
         if (stars.elements == nullptr) return x;
         Vec<D> trial = x;
-        for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings, trial = star.snap(star.position + 0.5 * (trial - star.position)))
+        for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
             if (loses_nothing(v, trial)) return trial;
+            trial = star.snap(star.position + 0.5 * (trial - star.position));
+        }
         return star.position;
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -102,15 +102,27 @@ class MixedTopology(Topology):
 
     def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the two ends (e,) of each edge, once, in the numbers of the connectivity."""
-        facets, size = self.facets, (self.facets >= 0).sum(axis=1)
-        ends = []
-        for position in range(WIDTH if self.dimension == 3 else 1):
-            here = facets[size > position]
-            behind = np.where(position + 1 < size[size > position], position + 1, 0)
-            ends.append((here[:, position], np.take_along_axis(here, behind[:, None], axis=1)[:, 0]))
-        one, other = (np.concatenate(part).astype(np.int64) for part in zip(*ends, strict=True))
-        keys = np.unique(np.minimum(one, other) << 32 | np.maximum(one, other))
-        return (keys >> 32).astype(np.int32), (keys & 0xFFFFFFFF).astype(np.int32)
+        keys = np.unique(np.concatenate([edges.ravel() for edges in parallel_edges(self.connectivity)]))
+        return ends_of(keys)
+
+
+def parallel_edges(mesh: kernels.Connectivity) -> Iterator[NDArray[np.int64]]:
+    """Give the edges (k, g) by groups that are parallel in the ideal element, each as one number; see `as_edges`."""
+    for code in np.unique(mesh.codes):
+        here = np.flatnonzero(mesh.codes == code)
+        for group in JUDGED[code].shape.parallel:
+            ends = mesh.nodes[mesh.node_offsets[here, None, None] + np.array(group)].astype(np.int64)
+            yield as_edges(ends[..., 0], ends[..., 1])
+
+
+def as_edges(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
+    """Return a number for each pair of vertices, whichever comes first."""
+    return np.minimum(one, other).astype(np.int64) << 32 | np.maximum(one, other)
+
+
+def ends_of(edges: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return the two vertices of edges, the smaller first."""
+    return (edges >> 32).astype(np.int32), (edges & 0xFFFFFFFF).astype(np.int32)
 
 
 def checked_blocks(cells: Sequence[tuple[str, ArrayLike]], n: int, dimension: int) -> Blocks:

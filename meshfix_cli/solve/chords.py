@@ -11,10 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.elements import JUDGED
+from meshfix_cli.mesh.mixed import as_edges, ends_of, parallel_edges
 
 Array = NDArray[np.float64]
-_CHUNK = 32  # bits of the number of a vertex
 
 
 def inverse_lengths(points: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_]) -> Array:
@@ -31,7 +30,7 @@ def inverse_lengths(points: Array, mesh: kernels.Connectivity, free: NDArray[np.
     if mesh.simplicial:
         return np.empty(0)
     keys, rows = _rows(mesh)
-    one, other = keys >> _CHUNK, keys & (1 << _CHUNK) - 1
+    one, other = ends_of(keys)
     known = ~(free[one] | free[other])
     length = np.linalg.norm(points[one[known]] - points[other[known]], axis=1)
     count = np.bincount(rows[known], minlength=rows.max() + 1)
@@ -39,7 +38,7 @@ def inverse_lengths(points: Array, mesh: kernels.Connectivity, free: NDArray[np.
     mean = length.mean() if len(length) and length.any() else 1.0
     of_row = np.divide(total, count, out=np.full(len(count), mean), where=total > 0)
     here = np.repeat(np.arange(len(points), dtype=np.int64), np.diff(mesh.neighbour_offsets))
-    pairs = np.minimum(here, mesh.neighbours) << _CHUNK | np.maximum(here, mesh.neighbours)
+    pairs = as_edges(here, mesh.neighbours)
     at = np.minimum(np.searchsorted(keys, pairs), len(keys) - 1)
     return np.where(keys[at] == pairs, mean / of_row[rows[at]], 0.0)
 
@@ -49,15 +48,9 @@ def _rows(mesh: kernels.Connectivity) -> tuple[NDArray[np.int64], NDArray[np.int
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    found, joined = [], []
-    for code in np.unique(mesh.codes):
-        here = np.flatnonzero(mesh.codes == code)
-        for group in JUDGED[code].shape.parallel:
-            ends = mesh.nodes[mesh.node_offsets[here, None, None] + np.array(group)].astype(np.int64)
-            edges = ends.min(axis=2) << _CHUNK | ends.max(axis=2)
-            found.append(edges.ravel())
-            joined += [edges[:, [0, k]] for k in range(1, len(group))]
-    keys = np.unique(np.concatenate(found))
+    groups = list(parallel_edges(mesh))
+    joined = [edges[:, [0, k]] for edges in groups for k in range(1, edges.shape[1])]
+    keys = np.unique(np.concatenate([edges.ravel() for edges in groups]))
     pairs = np.searchsorted(keys, np.concatenate(joined)) if joined else np.empty((0, 2), dtype=np.int64)
     graph = coo_matrix((np.ones(len(pairs), dtype=bool), (pairs[:, 0], pairs[:, 1])), shape=(len(keys),) * 2)
     return keys, connected_components(graph, directed=False)[1]

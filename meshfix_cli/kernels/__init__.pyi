@@ -321,6 +321,12 @@ def find_words(data: bytes, at: int, count: int) -> Int64:
 def line_words(data: bytes, offsets: Int64, count: int) -> Int64:
     """Spans (k * count, 2) of the first words behind each offset (k,), -1 for those that the line does not have."""
 
+def find_lines(data: bytes, at: int, count: int) -> tuple[Int64, Int64, int]:
+    """Words of the first lines behind an offset that have some.
+
+    Spans (k, 2), the number of the first word of each line and of all (lines + 1,), and the offset behind the last.
+    """
+
 def use_threads(threads: int) -> None:
     """Let the passes over text, from here to the end of this file, take as many threads: 1 at first."""
 
@@ -335,6 +341,12 @@ def integers(data: bytes, spans: Int64, slash: bool) -> tuple[Int64, int]:
 
 def numbers(data: bytes, spans: Int64, single: bool) -> tuple[Float64, int]:
     """Values of the words at spans (n, 2), and the row of the first that is not a number or -1; single: of float32."""
+
+def read_fields(data: bytes, spans: Int64) -> tuple[Float64, int]:
+    """The same of fields: blank ones are 0, and an exponent may have no letter, as in 1.5-3."""
+
+def write_fields(values: Float64, columns: int, padded: bool) -> tuple[bytes, Int64]:
+    """Texts of at most so many columns, with a point, joined, and their spans; padded: all columns are filled."""
 
 def shortest(values: Float64, single: bool, longest: int) -> tuple[bytes, Int64]:
     """The shortest texts that read back to the values, joined, and their spans; longest: characters at most, or 0."""

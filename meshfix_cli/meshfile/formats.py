@@ -104,6 +104,10 @@ def _pvtu(_: bytes, text: str) -> Format | None:
     return Format("pvtu") if _is_xml(text) and _vtk_xml(text, "PUnstructuredGrid") else None
 
 
+def _su2(_: bytes, text: str) -> Format | None:
+    return Format("su2") if re.match(r"(?:%[^\n]*\n\s*)*(?:NDIME|NZONE|NELEM|NPOIN|IZONE)\s*=", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin"))
 
@@ -120,6 +124,7 @@ OWN = {
     "medit": Own("medit", _medit, {".mesh": "medit"}),
     "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}),
     "obj": Own("obj", _obj, {".obj": "obj"}),
+    "su2": Own("su2", _su2, {".su2": "su2"}),
 }
 
 
@@ -139,8 +144,6 @@ def _of_meshio(text: str) -> Format | None:
     """Recognise what only meshio reads."""
     if _is_xml(text):
         return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
-    if re.match(r"(?:%[^\n]*\n\s*)*(?:NDIME|NZONE|NELEM|NPOIN)\s*=", text):
-        return Format("su2")
     if text.startswith("* FLAC3D"):
         return Format("flac3d")
     if _UCD.match(text):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.text import Spans, numbers_at
+from meshfix_cli.meshfile.text import Spans, fields_at, numbers_at
 
 Points = NDArray[np.floating[Any]]
 SLAB = 65536  # points whose coordinates are written at once
@@ -70,17 +71,20 @@ class Places:
         Type of the numbers, with its byte order where they are binary.
     longest : int
         Characters that the format allows for a number; 0: any number of them.
+    fields : {"", "free", "padded"}
+        Numbers are those of Fortran's and Nastran's fields of `longest` columns, which are to be filled or not.
     """
 
     begin: NDArray[np.int64]
     end: NDArray[np.int64] | None
     dtype: np.dtype[Any]
     longest: int = 0
+    fields: str = ""
 
     @classmethod
-    def of_text(cls, spans: Spans, dtype: str = "f8", longest: int = 0) -> Places:
+    def of_text(cls, spans: Spans, dtype: str = "f8", longest: int = 0, fields: str = "") -> Places:
         """Places of the words at spans (n, k, 2)."""
-        return cls(spans[..., 0], spans[..., 1], np.dtype(dtype), longest)
+        return cls(spans[..., 0], spans[..., 1], np.dtype(dtype), longest, fields)
 
     @classmethod
     def of_rows(cls, first: NDArray[np.int64], columns: int, dtype: str) -> Places:
@@ -101,7 +105,7 @@ class Places:
     def read(self, data: bytes) -> Any:
         """Return the numbers (n, k) in the machine's byte order; ReadError where there are none."""
         if self.end is not None:
-            return numbers_at(data, self.spans, self.dtype)
+            return self._decode(data, self.spans)
         size, native = self.dtype.itemsize, self.dtype.newbyteorder("=")
         if not self.begin.size:
             return np.empty(self.begin.shape, native)
@@ -119,7 +123,7 @@ class Places:
         values = values.astype(self.dtype.newbyteorder("="), copy=False)
         if self.longest:
             words, spans = self._encode(values.ravel())
-            values = numbers_at(words, spans, self.dtype).reshape(values.shape)
+            values = self._decode(words, spans).reshape(values.shape)
         return values
 
     def replace(self, which: NDArray[np.bool_], values: Points) -> Edits:
@@ -137,10 +141,16 @@ class Places:
         ends = np.cumsum([0, *map(len, words)])
         return Edits(np.ascontiguousarray(self.spans.reshape(-1, 2)), b"".join(words), pairs(ends))
 
+    def _decode(self, data: bytes, spans: Spans) -> Points:
+        return fields_at(data, spans) if self.fields else numbers_at(data, spans, self.dtype)
+
     def _encode(self, values: Points) -> tuple[bytes, Spans]:
         if self.end is None:
             return values.astype(self.dtype).tobytes(), pairs(np.arange(len(values) + 1) * self.dtype.itemsize)
-        return kernels.shortest(values.astype(np.float64, copy=False), self.dtype.itemsize == 4, self.longest)
+        numbers = values.astype(np.float64, copy=False)
+        if self.fields:
+            return kernels.write_fields(numbers, self.longest, self.fields == "padded")
+        return kernels.shortest(numbers, self.dtype.itemsize == 4, self.longest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,9 +189,15 @@ class InPlace:
         reversed_cells : mapping
             Cells by the number of their run.
         """
+        return self.divided(original, points, reversed_cells, ())[0]
+
+    def divided(
+        self, original: Points, points: Points, reversed_cells: Mapping[int, Turned], bounds: Sequence[int]
+    ) -> list[bytes]:
+        """Return the same in the parts into which ascending offsets divide the file."""
         changed = self._changes(original, points, slice(None))
         turned = (self.corners[run]().turn(self.data, cells) for run, cells in reversed_cells.items())
-        return apply(self.data, [changed, *turned])
+        return divided(self.data, [changed, *turned], bounds)
 
     def moved(self, original: Points, points: Points) -> Iterable[bytes | memoryview]:
         """Give the file with other points (n, d) in parts: never is much of it in memory once more."""
@@ -203,13 +219,23 @@ def differing(original: Points, points: Points) -> NDArray[np.bool_]:
 
 def apply(data: bytes, edits: Sequence[Edits]) -> bytes:
     """Return the data with all edits made; they may come in any order."""
+    return divided(data, edits, ())[0]
+
+
+def divided(data: bytes, edits: Sequence[Edits], bounds: Sequence[int]) -> list[bytes]:
+    """Return the data with all edits made, in the parts into which ascending offsets divide it."""
     starts = np.cumsum([0, *(len(edit.words) for edit in edits)])
     spans = np.concatenate([edit.spans for edit in edits])
     words = np.concatenate([edit.word_spans + start for edit, start in zip(edits, starts, strict=False)])
     if (np.diff(spans[:, 0]) < 0).any():
         order = np.argsort(spans[:, 0], kind="stable")
         spans, words = spans[order], words[order]
-    return b"".join(spliced(data, [Edits(spans, b"".join(edit.words for edit in edits), words)]))
+    text = b"".join(edit.words for edit in edits)
+    numbers = [0, *np.searchsorted(spans[:, 0], bounds).tolist(), len(spans)]
+    return [
+        kernels.replace(data, begin, end, spans[first:last], text, words[first:last])
+        for (begin, end), (first, last) in zip(pairwise([0, *bounds, len(data)]), pairwise(numbers), strict=True)
+    ]
 
 
 def spliced(data: bytes, edits: Iterable[Edits]) -> Iterator[bytes | memoryview]:

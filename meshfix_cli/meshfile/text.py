@@ -86,6 +86,16 @@ def numbers_at(data: bytes, spans: Spans, dtype: np.dtype[Any]) -> NDArray[np.fl
     return values.reshape(spans.shape[:-1]).astype(dtype, copy=False)
 
 
+def fields_at(data: bytes, spans: Spans) -> NDArray[np.float64]:
+    """Return the numbers (...) of fields as Fortran and Nastran read them; ReadError where one is not a number."""
+    flat = np.ascontiguousarray(spans.reshape(-1, 2))
+    values, bad = kernels.read_fields(data, flat)
+    if bad >= 0:
+        field = data[flat[bad, 0] : flat[bad, 1]].decode("latin-1").strip()
+        raise in_line(data, int(flat[bad, 0]), f"{field!r} is not a number")
+    return values.reshape(spans.shape[:-1])
+
+
 def in_line(data: bytes, at: int, what: str) -> ReadError:
     """Return the error that tells what is wrong at an offset."""
     number = data.count(b"\n", 0, at) + 1

@@ -10,8 +10,8 @@ import pytest
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.splice import Edits, Places, Turned, apply
-from meshfix_cli.meshfile.text import integers, integers_at, line_words, numbers_at, words
+from meshfix_cli.meshfile.splice import Edits, Places, Turned, apply, divided, pairs
+from meshfix_cli.meshfile.text import fields_at, integers, integers_at, line_words, numbers_at, words
 
 DOUBLE, SINGLE = np.dtype("f8"), np.dtype("f4")
 
@@ -121,6 +121,8 @@ def test_edits_in_any_order_change_nothing_else() -> None:
     late = Edits(np.array([[6, 8]]), b"333", np.array([[0, 3]]))
     early = Edits(np.array([[2, 3]]), b"", np.array([[0, 0]]))
     assert apply(data, [late, early]) == b"a  b 333 c"
+    for bounds in ([], [0], [2, 5], [5, 5, len(data)]):
+        assert b"|".join(divided(data, [late, early], bounds)).replace(b"|", b"") == b"a  b 333 c"
     with pytest.raises(ValueError, match="overlap"):
         apply(data, [early, early])
 
@@ -193,3 +195,49 @@ def test_long_texts_are_written_in_pieces(threads: int, random: np.random.Genera
     assert (
         kernels.replace(b"abc", 0, 3, np.empty((0, 2), dtype=np.int64), b"", np.empty((0, 2), dtype=np.int64)) == b"abc"
     )
+
+
+def test_lines_are_those_that_have_words(random: np.random.Generator) -> None:
+    text = b"  1 2,3\r\n\n\r\n a\r b b \n\t\n"
+    spans, starts, end = kernels.find_lines(text, 0, 9)
+    assert [text[a:b] for a, b in spans.tolist()] == [b"1", b"2", b"3", b"a", b"b", b"b"]
+    assert (starts.tolist(), text[end:]) == ([0, 3, 4, 6], b" \n\t\n")
+    assert kernels.find_lines(text, 0, 2)[1].tolist() == [0, 3, 4]
+    assert kernels.find_lines(text, end, 1)[1].tolist() == [0]
+    assert kernels.find_lines(b"", 0, 1)[1].tolist() == [0]
+
+
+@pytest.mark.parametrize("columns", [8, 16, 21])
+def test_fields_hold_the_most_digits_that_fit(columns: int, random: np.random.Generator) -> None:
+    values = random.standard_normal(2000) * 10.0 ** random.integers(-30, 30, 2000)
+    values[:9] = [0, 1, -1, 0.1, -0.1, 123456789, 1e-300, -1e300, 0.5]
+    text, spans = kernels.write_fields(values, columns, True)
+    assert (spans[:, 1] - spans[:, 0] == columns).all()
+    words = [text[a:b].decode().strip() for a, b in spans.tolist()]
+    assert all("." in word for word in words)  # else Nastran takes them for integers
+    back = fields_at(text, spans)
+    for value, word, read in zip(values.tolist(), words, back.tolist(), strict=True):
+        with_letter = word if "e" in word else re.sub(r"(?<=[\d.])(?=[-+])", "e", word)
+        assert float(with_letter) == read
+        digits = re.sub(r"e.*|[-.]", "", with_letter).strip("0")
+        assert read == value or read == float(f"{value:.{max(len(digits), 1) - 1}e}") or len(word) >= columns - 1
+        assert abs(read - value) <= 10.0 ** (6 - columns + (columns > 10)) * abs(value)
+    free, free_spans = kernels.write_fields(values, columns, False)
+    assert [free[a:b].decode() for a, b in free_spans.tolist()] == words
+
+
+def test_fields_are_read_as_fortran_and_nastran_do() -> None:
+    fields = {
+        b"  1.5-3 ": 1.5e-3,
+        b"-2.+10": -2e10,
+        b"      ": 0.0,
+        b"1.D2": 100.0,
+        b".5": 0.5,
+        b"-7": -7.0,
+        b"1.e-3": 1e-3,
+    }
+    text, spans = b"".join(fields), np.cumsum([0, *map(len, fields)])
+    assert fields_at(text, pairs(spans)).tolist() == list(fields.values())
+    for wrong in (b"1.5 -3", b"-", b"1-", b"a-3", b"1.5--3", b"1e5-3"):
+        with pytest.raises(ReadError, match="is not a number"):
+            fields_at(wrong, np.array([[0, len(wrong)]]))

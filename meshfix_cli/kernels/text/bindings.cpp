@@ -33,6 +33,11 @@ auto line_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offs
     return to_numpy(std::move(spans), 2);
 }
 
+nb::tuple find_lines_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    Lines lines = find_lines(view_of(data), at, count);
+    return nb::make_tuple(to_numpy(std::move(lines.spans), 2), to_numpy(std::move(lines.starts)), lines.end);
+}
+
 std::int64_t behind_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
     return behind_words(view_of(data), at, count, text_threads);
 }
@@ -76,7 +81,13 @@ auto numbers_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans, 
                   : read_words<double, double>(data, spans, read_number<double>);
 }
 
-auto shortest_py(const Vector<const double>& values, bool single, int longest) {
+auto read_fields_py(const nb::bytes& data, const Matrix<const std::int64_t>& spans) {
+    return read_words<double, double>(data, spans, read_field<double>);
+}
+
+// Writes the texts of values (n,) by put(text, value), one behind the other.
+template <class Put>
+auto write_words(const Vector<const double>& values, const Put& put) {
     const auto count = static_cast<std::int64_t>(values.shape(0));
     std::vector<std::string> parts(count / PER_ITEM + 1);
     std::vector<std::int64_t> spans(2 * count);
@@ -84,11 +95,7 @@ auto shortest_py(const Vector<const double>& values, bool single, int longest) {
         std::string& part = parts[item];
         for (std::int64_t i = begin; i < end; ++i) {
             spans[2 * i] = static_cast<std::int64_t>(part.size());
-            if (single) {
-                append_shortest(part, static_cast<float>(values(i)), longest);
-            } else {
-                append_shortest(part, values(i), longest);
-            }
+            put(part, values(i));
             spans[2 * i + 1] = static_cast<std::int64_t>(part.size());
         }
     });
@@ -103,6 +110,22 @@ auto shortest_py(const Vector<const double>& values, bool single, int longest) {
     char* to = PyBytes_AsString(words.ptr());
     for (const auto& part : parts) to = std::copy(part.begin(), part.end(), to);
     return std::make_pair(words, to_numpy(std::move(spans), 2));
+}
+
+auto shortest_py(const Vector<const double>& values, bool single, int longest) {
+    return write_words(values, [single, longest](std::string& text, double value) {
+        if (single) {
+            append_shortest(text, static_cast<float>(value), longest);
+        } else {
+            append_shortest(text, value, longest);
+        }
+    });
+}
+
+auto write_fields_py(const Vector<const double>& values, int columns, bool padded) {
+    return write_words(values, [columns, padded](std::string& text, double value) {
+        append_field(text, value, columns, padded);
+    });
 }
 
 // The text between two offsets. A span that is not in it counts as empty, and so where it is put.
@@ -141,12 +164,15 @@ nb::bytes replace_py(const nb::bytes& data, std::int64_t first, std::int64_t las
 void bind_text(nb::module_& m) {
     m.def("find_words", &find_words_py, "data"_a, "at"_a, "count"_a);
     m.def("line_words", &line_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a);
+    m.def("find_lines", &find_lines_py, "data"_a, "at"_a, "count"_a);
     m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
     m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);
     m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
     m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert(), "slash"_a);
     m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
+    m.def("read_fields", &read_fields_py, "data"_a, "spans"_a.noconvert());
     m.def("shortest", &shortest_py, "values"_a.noconvert(), "single"_a, "longest"_a);
+    m.def("write_fields", &write_fields_py, "values"_a.noconvert(), "columns"_a, "padded"_a);
     m.def("replace", &replace_py, "data"_a, "first"_a, "last"_a, "spans"_a.noconvert(), "words"_a, "word_spans"_a.noconvert());
 }
 

@@ -102,6 +102,27 @@ inline std::vector<std::int64_t> find_words(std::string_view text, std::int64_t 
     return spans;
 }
 
+// The words of the next lines that have some, from an offset on: as many lines as there are, at most `count`.
+struct Lines {
+    std::vector<std::int64_t> spans;
+    std::vector<std::int64_t> starts{0};  // the number of the first word of each line, and of all words
+    std::int64_t end;                     // behind the last word
+};
+
+inline Lines find_lines(std::string_view text, std::int64_t at, std::int64_t count) {
+    Lines lines;
+    lines.end = at;
+    for (Span word = next_word(text, at, false); count > 0 && word.begin >= 0; --count) {
+        for (; word.begin >= 0; word = next_word(text, word.end, true)) {
+            lines.spans.insert(lines.spans.end(), {word.begin, word.end});
+            lines.end = word.end;
+        }
+        lines.starts.push_back(static_cast<std::int64_t>(lines.spans.size() / 2));
+        word = next_word(text, lines.end, false);
+    }
+    return lines;
+}
+
 // The offset behind the next `count` words; -1: there are fewer.
 inline std::int64_t behind_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
     const Pieces pieces = cut(text, at, count, threads);
@@ -248,6 +269,21 @@ bool read_number(std::string_view word, Real& value) {
     return read_number_slowly(word, value);
 }
 
+// Reads what a field of Fortran or Nastran holds: blanks around it, or nothing else, which is 0, and exponents without a
+// letter, as in 1.5-3.
+template <class Real>
+bool read_field(std::string_view field, Real& value) {
+    const auto blank = [](char c) { return static_cast<unsigned char>(c) <= ' '; };
+    while (!field.empty() && blank(field.front())) field.remove_prefix(1);
+    while (!field.empty() && blank(field.back())) field.remove_suffix(1);
+    if (field.empty() || read_number(field, value)) return true;
+    const std::size_t sign = field.find_last_of("+-");
+    if (sign == std::string_view::npos || sign == 0) return false;
+    const char before = field[sign - 1];
+    if (before != '.' && (before < '0' || before > '9')) return false;
+    return read_number_slowly(std::string(field.substr(0, sign)) + "e" + std::string(field.substr(sign)), value);
+}
+
 template <class Real>
 std::string with_digits(Real value, int digits) {
     char buffer[40];
@@ -274,6 +310,60 @@ void append_shortest(std::string& text, Real value, int longest) {
         text.resize(begin);
         text += with_digits(value, digits);
     }
+}
+
+// The number whose digits and exponent stand in the text of a number, "-d.ddde+xx", with a point, as Fortran and Nastran
+// tell reals by, and no more than it takes.
+inline std::string as_field(std::string_view scientific, bool letter) {
+    const std::size_t e = scientific.find('e');
+    const bool minus = scientific[0] == '-';
+    std::string digits;
+    for (const char c : scientific.substr(0, e))
+        if (c >= '0' && c <= '9') digits += c;
+    while (digits.size() > 1 && digits.back() == '0') digits.pop_back();
+    int exponent = 0;
+    const std::string_view power = without_plus(scientific.substr(e + 1));
+    std::from_chars(power.data(), power.data() + power.size(), exponent);
+    const std::string sign = minus ? "-" : "";
+    const std::string sign_of_power = exponent < 0 ? "-" : letter ? "" : "+";
+    std::string with_power = sign + digits.substr(0, 1) + "." + digits.substr(1) + (letter ? "e" : "") + sign_of_power +
+                             std::to_string(std::abs(exponent));
+    const int size = static_cast<int>(digits.size());
+    if (exponent < -20 || exponent > 20) return with_power;
+    std::string plain = sign;
+    if (exponent < 0) {
+        plain += "." + std::string(-exponent - 1, '0') + digits;
+    } else if (exponent + 1 < size) {
+        plain += digits.substr(0, exponent + 1) + "." + digits.substr(exponent + 1);
+    } else {
+        plain += digits + std::string(exponent + 1 - size, '0') + ".";
+    }
+    return plain.size() <= with_power.size() ? plain : with_power;
+}
+
+// How many digits it takes to read back to the value.
+inline int digits_of(double value) {
+    std::string shortest;
+    append_shortest(shortest, value, 0);
+    int digits = 0;
+    for (const char c : std::string_view(shortest).substr(0, shortest.find('e')))
+        digits += c >= '0' && c <= '9' && (digits > 0 || c != '0');
+    return std::max(digits, 1);
+}
+
+// Appends the number with as many digits as a field of so many columns holds, at most those that it takes to read back,
+// if `padded` behind blanks that fill it. In few columns the exponent has no letter, which Nastran knows as well.
+inline void append_field(std::string& text, double value, int columns, bool padded) {
+    std::string field;
+    for (int digits = std::min(digits_of(value), columns - 1); digits > 0; --digits) {
+        char buffer[40];
+        std::snprintf(buffer, sizeof buffer, "%.*e", digits - 1, value);
+        field = as_field(buffer, columns > 10);
+        if (static_cast<int>(field.size()) <= columns) break;
+    }
+    const int missing = columns - static_cast<int>(field.size());
+    if (padded && missing > 0) text.append(missing, ' ');
+    text += field;
 }
 
 }  // namespace meshfix

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, counted
 from meshfix_cli.meshfile.source import Cells, regions_among
+from meshfix_cli.meshfile.tables import alike
 
 # The name and the number of vertices; 0: any.
 TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() if element.vtk is not None} | {
@@ -27,7 +28,6 @@ TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() 
     81: ("VTK_BEZIER_PYRAMID", 0),
 }  # fmt: skip
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
-_MOST_RUNS = 1000  # above, cells of a type are gathered from all over the file
 
 
 class Run(NamedTuple):
@@ -74,7 +74,7 @@ def runs(
     if len(sizes) != len(types) or offsets[0] < 0 or (sizes < 0).any() or offsets[-1] > len(connectivity):
         raise ReadError("is not a readable VTK file: the offsets of its cells do not fit their vertices")
     found = []
-    for rows in _same(types, sizes):
+    for rows in alike(types, sizes):
         number, size = int(types[rows[0]]), int(sizes[rows[0]])
         name, expected = TYPES.get(number, (f"vtk{number}", 0))
         if name == "polygon":
@@ -113,17 +113,3 @@ def markings(
         return regions, list(cells)
     ghosts = [np.any([cell()[name][i] != 0 for name in marks], axis=0) for i in range(len(cells))]
     return regions, [replace(run, ghosts=mask) for run, mask in zip(cells, ghosts, strict=True)]
-
-
-def _same(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> Sequence[NDArray[np.int64]]:
-    """Rows of cells of one type and size, run by run."""
-    rows = np.arange(len(types))
-    starts = _changes(types, sizes)
-    if len(starts) >= _MOST_RUNS:
-        rows = np.lexsort((sizes, types))
-        starts = _changes(types[rows], sizes[rows])
-    return np.split(rows, starts) if len(rows) else []
-
-
-def _changes(types: NDArray[np.integer[Any]], sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.flatnonzero((np.diff(types) != 0) | (np.diff(sizes) != 0)) + 1

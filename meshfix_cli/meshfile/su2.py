@@ -1,0 +1,127 @@
+"""SU2's .su2 files: keywords `NAME= value`, of which NELEM, NPOIN and MARKER_ELEMS are followed by as many lines.
+
+A line of NPOIN has the coordinates and, often, the number of the point, one of the others the number of VTK for the
+type, the vertices and, often, the number of the element. Several zones, each with all of these, are parts of one mesh.
+
+Source: SU2 documentation, "Mesh File"; SU2, "CSU2ASCIIMeshReaderBase.cpp".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.source import Cells, Source
+from meshfix_cli.meshfile.splice import InPlace, Places
+from meshfix_cli.meshfile.tables import Int64, Lines, Numbering, Runs, alike, lines, without
+from meshfix_cli.meshfile.text import Spans, in_line
+from meshfix_cli.meshfile.vtk.cells import TYPES
+
+_COMMENT = re.compile(rb"%[^\n\r]*")
+_KEYWORD = re.compile(rb"([A-Za-z_]\w*)[ \t]*=[ \t]*([^\n\r]*)")
+_SENDING = re.compile(rb"\s*SEND_RECV[ \t]*=[^\n\r]*")  # between the number of a marker's elements and these
+_ZONE = "su2:zone"
+
+
+@dataclass
+class _Zone:
+    """What the keywords of a zone announce; the elements of the mesh are those of the marker ""."""
+
+    dimension: int = 0
+    points: Lines | None = None
+    markers: list[tuple[str, Lines]] = field(default_factory=list)
+
+    def coordinates(self) -> Spans:
+        """(n, d, 2) int64."""
+        if self.points is None or "" not in (name for name, _ in self.markers):
+            raise ReadError("is truncated or not readable: a zone has no NPOIN, or no NELEM")
+        return self.points.columns(0, self.dimension)
+
+
+def parse(data: bytes) -> Source:
+    """Read points, elements and markers of all zones; the facets of markers are cells of the file."""
+    text = without(data, _COMMENT, b"%")
+    zones = list(_zones(text))
+    spans = [zone.coordinates() for zone in zones]
+    if len({one.shape[1] for one in spans}) != 1:
+        raise ReadError("has zones of two and of three dimensions" if spans else "is truncated: it has no NDIME")
+    runs, point, element = Runs(), 0, 0
+    for number, (zone, here) in enumerate(zip(zones, spans, strict=True), start=1):
+        labels = {_ZONE: number} if len(zones) > 1 else {}
+        for name, table in zone.markers:
+            for kind, rows in _by_type(table):
+                ids = None if name else rows + element
+                vertices = Numbering(np.arange(len(here))).points_of(table.integers(1, 1 + kind[1], rows), ids)
+                corners = partial(_corners, table, kind[1], rows)
+                runs.add(Cells(kind[0], vertices + point, ids), corners, labels, (name,) if name else ())
+            element += 0 if name else len(table.counts)
+        point += len(here)
+    coordinates = Places.of_text(np.concatenate(spans))
+    untold = ("comments",) * (text is not data) + ("boxes for deformation",) * (b"FFD_" in text)
+    return Source(
+        coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners), runs.arrays,
+        (_ZONE,) * (len(zones) > 1), untold=untold, apart=len(zones) > 1,
+    )  # fmt: skip
+
+
+def _zones(text: bytes) -> Iterator[_Zone]:
+    zone, name, at, behind = _Zone(), "", 0, 0
+    while match := _KEYWORD.search(text, at):
+        if behind == at:
+            _check_blank(text, at, match.start())
+        keyword, at = match[1].upper(), match.end()
+        if keyword == b"IZONE" or (keyword == b"NDIME" and zone.dimension):
+            if zone.dimension:
+                yield zone
+            zone = _Zone()
+        if keyword == b"NDIME":
+            zone.dimension = _count(text, match)
+            if zone.dimension not in (2, 3):
+                raise in_line(text, at, f"NDIME is {zone.dimension}")
+        elif keyword == b"NPOIN":
+            zone.points = lines(text, at, _count(text, match), "point")
+            at = behind = zone.points.end
+        elif keyword == b"MARKER_TAG":
+            name = match[2].strip().decode("latin-1")
+        elif keyword in (b"NELEM", b"MARKER_ELEMS"):
+            sending = _SENDING.match(text, at)
+            table = lines(text, sending.end() if sending else at, _count(text, match), "element")
+            zone.markers.append(("" if keyword == b"NELEM" else name or "?", table))
+            at = behind = table.end
+    if behind == at:
+        _check_blank(text, at, len(text))
+    if zone.dimension:
+        yield zone
+
+
+def _check_blank(text: bytes, begin: int, end: int) -> None:
+    left = text[begin:end].lstrip()
+    if left:
+        raise in_line(text, end - len(left), "there are more lines than announced")
+
+
+def _count(text: bytes, match: re.Match[bytes]) -> int:
+    words = match[2].split()
+    if not words or not words[0].isdigit():
+        raise in_line(text, match.start(), f"{match[1].decode()} has no number")
+    return int(words[0][:18])
+
+
+def _by_type(table: Lines) -> Iterator[tuple[tuple[str, int], Int64]]:
+    """Give the types of elements, their name and size, and their rows."""
+    types = table.integers(0, 1)[:, 0]
+    for rows in alike(types):
+        kind = TYPES.get(int(types[rows[0]]), ("", 0))
+        if not kind[1]:
+            at = int(table.spans[table.starts[rows[0]], 0])
+            raise in_line(table.text, at, f"elements of the type {types[rows[0]]} are not known")
+        yield kind, rows
+
+
+def _corners(table: Lines, size: int, rows: Int64) -> Places:
+    return Places.of_text(table.columns(1, 1 + size, rows), "i8")

@@ -1,0 +1,220 @@
+"""Tables of numbers in a text: where their rows stand, which points they name, and which cells are of one kind.
+
+What a format adds is where its tables begin and what their columns are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import counted
+from meshfix_cli.meshfile.source import Arrays, Cells
+from meshfix_cli.meshfile.splice import Places
+from meshfix_cli.meshfile.text import Spans, in_line, integers_at, words
+
+Int64 = NDArray[np.int64]
+
+_MOST_RUNS = 1000  # above, cells of a kind are gathered from all over the file
+
+
+def without(data: bytes, pattern: re.Pattern[bytes], mark: bytes = b"") -> bytes:
+    """Return the data with blanks in the place of what fits, comments say, so that all else stands where it stood.
+
+    Parameters
+    ----------
+    mark : bytes
+        Where it is not in the data, nothing fits.
+    """
+    return pattern.sub(lambda found: b" " * len(found[0]), data) if mark in data else data
+
+
+class Lines(NamedTuple):
+    """The words of some lines.
+
+    Attributes
+    ----------
+    text : bytes
+    spans : (k, 2) int64
+    starts : (n+1,) int64
+        The number of the first word of each line, and of all words.
+    end : int
+        The offset behind the last word.
+    """
+
+    text: bytes
+    spans: Spans
+    starts: Int64
+    end: int
+
+    @property
+    def counts(self) -> Int64:
+        """(n,) int64: how many words a line has."""
+        return np.diff(self.starts)
+
+    def columns(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Spans:
+        """Return the spans (k, last - first, 2) of some words of some lines; ReadError where a line has fewer."""
+        starts = self.starts[:-1][rows]
+        short = np.flatnonzero(self.starts[1:][rows] - starts < last)
+        if len(short):
+            at = int(self.spans[starts[short[0]], 0])
+            raise in_line(self.text, at, f"there are not {counted(last, 'number', 'numbers')}")
+        if len(starts) and (np.diff(starts) == starts[0:1] + last).all() and not first:
+            return self.spans[starts[0] : starts[-1] + last].reshape(len(starts), last, 2)
+        return self.spans[starts[:, None] + np.arange(first, last)]
+
+    def integers(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Int64:
+        """Return the integers (k, last - first) that stand there."""
+        return integers_at(self.text, self.columns(first, last, rows))
+
+
+def lines(text: bytes, at: int, count: int, what: str = "line") -> Lines:
+    """Find the words of the next lines that have some.
+
+    Raises
+    ------
+    ReadError
+        There are not as many as a file announces.
+    """
+    found = kernels.find_lines(text, at, count)
+    if not 0 <= count == len(found[1]) - 1:
+        raise ReadError(f"is truncated: {counted(count, what, what + 's')} announced, and not all are there")
+    return Lines(text, *found)
+
+
+def rows(text: bytes, at: int, count: int, columns: int) -> tuple[Spans, int]:
+    """Find the words (count, columns, 2) of rows of equally many, wherever lines end, and the offset behind them."""
+    if not 0 <= count * columns <= len(text) - at:
+        raise ReadError(f"is truncated: {counted(count, 'row is', 'rows are')} announced")
+    spans = words(text, at, count * columns)
+    return spans.reshape(count, columns, 2), int(spans[-1, 1]) if len(spans) else at
+
+
+class Numbering:
+    """The numbers that a file gives to its points or cells, in the order of their rows.
+
+    Parameters
+    ----------
+    numbers : (n,) int64
+    """
+
+    def __init__(self, numbers: Int64) -> None:
+        self.order: Int64 | None = None
+        if not (numbers[1:] > numbers[:-1]).all():
+            self.order = np.argsort(numbers, kind="stable")
+            numbers = numbers[self.order]
+        self.sorted = numbers
+        self._gapless = bool((np.diff(numbers) == 1).all())
+
+    def rows_of(self, numbers: Int64) -> Int64:
+        """Return the rows (...) of numbers (...); -1: there is none. Of a number given twice, the first."""
+        if not len(self.sorted):
+            return np.full(numbers.shape, -1)
+        at = numbers - self.sorted[0] if self._gapless else np.searchsorted(self.sorted, numbers)
+        at = np.clip(at, 0, len(self.sorted) - 1)
+        return np.where(self.sorted[at] == numbers, at if self.order is None else self.order[at], -1)
+
+    def twice(self) -> int | None:
+        """Return a number that is given twice."""
+        repeated = self.sorted[1:][self.sorted[1:] == self.sorted[:-1]]
+        return int(repeated[0]) if len(repeated) else None
+
+    def points_of(self, numbers: Int64, cells: Int64 | None = None) -> Int64:
+        """Return the rows (m, k) of the points that cells name.
+
+        Parameters
+        ----------
+        numbers : (m, k) int64
+        cells : (m,) int64, optional
+            The numbers of the cells; default: their positions.
+
+        Raises
+        ------
+        ReadError
+            There is no such point, or two.
+        """
+        if (number := self.twice()) is not None:
+            raise ReadError(f"the point {number} is defined twice")
+        found = self.rows_of(numbers)
+        if (unknown := np.argwhere(found < 0)).size:
+            cell = unknown[0][0] if cells is None else cells[unknown[0][0]]
+            named = numbers[tuple(unknown[0])]
+            raise ReadError(f"is truncated or not readable: the cell {cell} names the point {named}, and there is none")
+        return found
+
+
+def alike(*kinds: NDArray[Any]) -> Sequence[Int64]:
+    """Divide rows into runs of one kind, in their order where these are not too many.
+
+    Parameters
+    ----------
+    *kinds : (n,) int
+        Rows are of one kind where all of these are equal.
+    """
+    order = np.arange(len(kinds[0]))
+    starts = _changes(kinds)
+    if len(starts) >= _MOST_RUNS:
+        order = np.lexsort(kinds[::-1])
+        starts = _changes([kind[order] for kind in kinds])
+    return np.split(order, starts) if len(order) else []
+
+
+@dataclass(eq=False)
+class Runs:
+    """Runs of cells, with what belongs to each, as a format finds them one by one.
+
+    Attributes
+    ----------
+    cells : list of Cells
+    corners : list of callables
+        See `splice.InPlace`.
+    """
+
+    cells: list[Cells] = field(default_factory=list)
+    corners: list[Callable[[], Places]] = field(default_factory=list)
+    _labels: dict[str, dict[int, NDArray[Any]]] = field(default_factory=dict)
+    _sets: dict[str, dict[int, Int64]] = field(default_factory=dict)
+
+    def add(
+        self,
+        cells: Cells,
+        corners: Callable[[], Places],
+        labels: Mapping[str, Any] = MappingProxyType({}),
+        sets: Iterable[str] = (),
+    ) -> None:
+        """Take a run of m cells with labels, each (m,) int or one for all, which is in some sets of cells."""
+        i, m = len(self.cells), len(cells.vertices)
+        self.cells.append(cells)
+        self.corners.append(corners)
+        for name, values in labels.items():
+            self._labels.setdefault(name, {})[i] = np.broadcast_to(values, m)
+        for name in sets:
+            self.put(name, i, np.arange(m))
+
+    def put(self, name: str, run: int, rows: Int64) -> None:
+        """Put some cells of a run into a set."""
+        self._sets.setdefault(name, {})[run] = rows
+
+    def arrays(self, point_sets: Mapping[str, Int64] = MappingProxyType({})) -> Arrays:
+        """Return the labels, 0 where a run has none, and the sets."""
+        sizes, none = [len(run.vertices) for run in self.cells], np.empty(0, dtype=np.int64)
+        return Arrays(
+            cell={
+                name: [runs.get(i, np.zeros(size, dtype=np.int64)) for i, size in enumerate(sizes)]
+                for name, runs in self._labels.items()
+            },
+            cell_sets={name: [runs.get(i, none) for i in range(len(sizes))] for name, runs in self._sets.items()},
+            point_sets=point_sets,
+        )
+
+
+def _changes(kinds: Sequence[NDArray[Any]]) -> Int64:
+    return np.flatnonzero(np.any([np.diff(kind) != 0 for kind in kinds], axis=0)) + 1

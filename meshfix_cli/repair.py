@@ -9,6 +9,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from meshfix_cli.errors import RequirementError, WriteError
@@ -92,14 +93,14 @@ class Files:
         ReadError, InvalidMeshError, WriteError
         """
         from meshfix_cli.meshfile.atomic import check_target
-        from meshfix_cli.meshfile.writing import check_pieces, output_format
+        from meshfix_cli.meshfile.writing import check_output, output_format
 
-        if not self.dry_run:
+        if not self.dry_run and not Path(self.target).is_dir():  # which only the mesh tells whether it may be
             check_target(self.target)
         document = held.read(self.source, threads, double=self.double, fix_orientation=self.fix_orientation)
         output = output_format(document, self.target, self.form)
         if not self.dry_run:
-            check_pieces(document, self.target, output)
+            check_output(document, self.target, output)
         if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
             lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
             raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")

@@ -67,7 +67,7 @@ class Document:
     def files(self) -> tuple[str, ...]:
         """The names of the files that hold the mesh."""
         pieces = self.source.pieces
-        return (self.name, *(map(str, pieces.family.paths) if pieces else ()))
+        return (self.name, *(map(str, pieces.paths) if pieces else ()))
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -77,7 +77,7 @@ class Document:
     def outputs(self, target: str, form: Format) -> tuple[str, ...]:
         """Return the names of the files that an output in a format has; WriteError where it cannot be."""
         pieces = self.source.pieces
-        return (target, *(pieces.family.targets(target) if pieces and form == self.format else ()))
+        return (target, *(pieces.targets(target) if pieces and form == self.format else ()))
 
     def file_points(self, mesh: Mesh) -> NDArray[np.floating[Any]]:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""

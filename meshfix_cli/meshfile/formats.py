@@ -42,11 +42,14 @@ class Own:
         (all bytes, the first of them as text without blanks in front) -> Format, or None where it is not this.
     extensions : dict
         The name of the `Format` that a file with this extension becomes.
+    beside : bool
+        A file may need others beside it: `parse` gets its path as well, or None.
     """
 
     module: str
     recognise: Callable[[bytes, str], Format | None]
     extensions: Mapping[str, str]
+    beside: bool = False
 
 
 def _abaqus(_: bytes, text: str) -> Format | None:
@@ -108,6 +111,10 @@ def _su2(_: bytes, text: str) -> Format | None:
     return Format("su2") if re.match(r"(?:%[^\n]*\n\s*)*(?:NDIME|NZONE|NELEM|NPOIN|IZONE)\s*=", text) else None
 
 
+def _openfoam(_: bytes, text: str) -> Format | None:
+    return Format("openfoam") if re.search(r"^FoamFile\s*\{", text, re.MULTILINE) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin"))
 
@@ -124,6 +131,7 @@ OWN = {
     "medit": Own("medit", _medit, {".mesh": "medit"}),
     "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}),
     "obj": Own("obj", _obj, {".obj": "obj"}),
+    "openfoam": Own("openfoam", _openfoam, {".foam": "openfoam"}, beside=True),
     "su2": Own("su2", _su2, {".su2": "su2"}),
 }
 

@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import ReadError, WriteError, naming
+from meshfix_cli.errors import ReadError, naming
 from meshfix_cli.mesh.elements import counted
-from meshfix_cli.meshfile.atomic import check_target, is_stream
 from meshfix_cli.meshfile.joining import Copies, Int64, by_numbers, by_place, joined
 from meshfix_cli.meshfile.source import Arrays, Cells, Family, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import Points, Turned, differing
@@ -46,9 +45,22 @@ class Joined:
     rows: Sequence[Int64]
     origins: Sequence[_Origin]
 
+    @property
+    def paths(self) -> Sequence[Path]:
+        """Where the pieces are."""
+        return self.family.paths
+
+    def targets(self, target: str) -> list[str]:
+        """Return where those of an output go; WriteError where that cannot be."""
+        return self.family.targets(target)
+
     def rounded(self, points: Points) -> Points:
         """Return points (n, d) as the pieces can hold them."""
         return _filled(self.sources)[0].rounded(points)
+
+    def turned(self, original: Points, cells: Mapping[int, Turned], threads: int) -> Source:
+        """Return the mesh with some cells turned."""
+        return join(self.family, self.family.parse(list(self.rewritten(original, original, cells))), threads)
 
     def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> Iterator[bytes]:
         """Give each piece with other points (n, d) of the mesh, and with some cells turned."""
@@ -66,21 +78,9 @@ class Joined:
 
     def files(self, target: str, original: Points, points: Points) -> Iterator[tuple[str, bytes]]:
         """Give names and contents of all files of an output, what names the pieces last."""
-        targets = self.family.targets(target)
+        targets = self.targets(target)
         yield from zip(targets, self.rewritten(original, points, {}), strict=True)
         yield from self.family.beside(target, targets)
-
-    def check(self, target: str, kept: bool) -> None:
-        """Raise WriteError where an output, in the same format if `kept`, cannot be or would replace a piece."""
-        if kept and is_stream(target):
-            name = "<stdout>" if target == "-" else target
-            raise WriteError(f"{name}: a mesh in several files cannot go into a stream; name an OUTPUT, or a --format")
-        if kept:
-            for piece in self.family.targets(target):
-                if Path(piece).parent.is_dir():  # else it will be made
-                    check_target(piece)
-        elif Path(target).resolve() in [path.resolve() for path in self.family.paths]:
-            raise WriteError(f"{target}: is a piece of the input; name another OUTPUT")
 
 
 def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:

@@ -103,11 +103,12 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
         return _open_pieces(Parts.of(str(path)), double, threads)
     if path is not None and set("?[") & set(path.name) and not path.exists():
         raise ReadError("there is no such file; the files of one mesh are named with a *")
-    data = _read_bytes(path)
-    form = _format(data, Path() if path is None else path, name)
+    folder = path is not None and (path.is_dir() or path.suffix.lower() == ".foam")
+    data = b"" if folder else _read_bytes(path)
+    form = Format("openfoam") if folder else _format(data, Path() if path is None else path, name)
     if form is None:
         raise ReadError("the format is not recognised")
-    beside = path if path is not None and path.is_file() else None  # a pipe can be read only once
+    beside = path if path is not None and (folder or path.is_file()) else None  # a pipe can be read only once
     if form.name == "pvtu":
         from meshfix_cli.meshfile.vtk.pvtu import Index
 
@@ -171,7 +172,8 @@ def parse(data: bytes, form: Format, path: Path | None = None) -> Source:
     source = None
     if form.reader in formats.OWN:
         with _believable(form):
-            source = _module(form).parse(data)
+            module = _module(form)
+            source = module.parse(data, path) if formats.OWN[form.reader].beside else module.parse(data)
     if source is None:
         from meshfix_cli.meshfile import through_meshio
 
@@ -201,8 +203,7 @@ def _promoted(data: bytes, form: Format) -> Source:
 
 def _with_reversed(source: Source, cells: dict[int, Turned], form: Format, threads: int) -> Source:
     if source.pieces is not None:
-        family = source.pieces.family
-        return join(family, family.parse(list(source.pieces.rewritten(source.points, source.points, cells))), threads)
+        return source.pieces.turned(source.points, cells, threads)
     if source.layout is not None:
         return parse(source.layout.rewritten(source.points, source.points, cells), form)
     return with_reversed(source, cells)

@@ -134,23 +134,23 @@ class Family(Protocol):
 
 
 class Pieces(Protocol):
-    """What stands for the layout of a mesh that lies in several files; see `pieces.Joined`."""
+    """What stands for the layout of a mesh that lies in several files; see `pieces.Joined` and `together.Together`."""
 
     @property
-    def family(self) -> Family:
-        """The files."""
+    def paths(self) -> Sequence[Path]:
+        """Where the files are."""
+
+    def targets(self, target: str) -> list[str]:
+        """Return where those of an output go; WriteError where that cannot be."""
 
     def rounded(self, points: Points) -> Points:
-        """Return points (n, d) as the pieces can hold them."""
+        """Return points (n, d) as the files can hold them."""
 
-    def rewritten(self, original: Points, points: Points, reversed_cells: Mapping[int, Turned]) -> Iterable[bytes]:
-        """Give each piece with other points (n, d) of the mesh, and with some cells turned."""
+    def turned(self, original: Points, cells: Mapping[int, Turned], threads: int) -> Source:
+        """Return what the files hold with some cells turned."""
 
     def files(self, target: str, original: Points, points: Points) -> Iterator[tuple[str, bytes]]:
-        """Give names and contents of all files of an output, what names the pieces last."""
-
-    def check(self, target: str, kept: bool) -> None:
-        """Raise WriteError where an output, in the same format if `kept`, cannot be or would replace a piece."""
+        """Give names and contents of the files of an output, what names the others last."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -167,6 +167,25 @@ def alike(*kinds: NDArray[Any]) -> Sequence[Int64]:
     return np.split(order, starts) if len(order) else []
 
 
+def chain(numbers: NDArray[np.integer[Any]], count: int, what: str) -> Int64:
+    """Return where (count,) rows begin that each begin with the number of what follows in them.
+
+    Raises
+    ------
+    ReadError
+        There are not as many numbers; `what` they are.
+    """
+    starts, at, view = [], 0, numbers.data
+    for _ in range(count):
+        if at >= len(view) or view[at] < 0:
+            break
+        starts.append(at)
+        at += view[at] + 1
+    if len(starts) != count or at != len(view):
+        raise ReadError(f"is not a readable file: the {what} do not add up")
+    return np.array(starts, dtype=np.int64)
+
+
 @dataclass(eq=False)
 class Runs:
     """Runs of cells, with what belongs to each, as a format finds them one by one.

@@ -65,8 +65,7 @@ def write(
     """
     target = os.fspath(target)
     form = form or output_format(document, target)
-    check_target(target)
-    check_pieces(document, target, form)
+    check_output(document, target, form)
     points, source, put = document.file_points(mesh), document.source, None if is_stream(target) else put
     stored = document.in_plane(points.astype(np.float64), mesh)
     layout, pieces = (source.layout, source.pieces) if form == document.format else (None, None)
@@ -158,10 +157,24 @@ def cells_extensions() -> tuple[str, ...]:
     return tuple(extension for name in _WITH_CELLS for extension in formats.OWN[name].extensions)
 
 
-def check_pieces(document: Document, target: str, form: Format) -> None:
-    """Raise WriteError now, before any work, where the pieces of a mesh cannot be written for this target."""
-    if document.source.pieces is not None:
-        document.source.pieces.check(target, form == document.format)
+def check_output(document: Document, target: str, form: Format) -> None:
+    """Raise WriteError now, before any work, where an output cannot be or would replace a piece of the input."""
+    pieces = document.source.pieces
+    if pieces is not None and form == document.format:
+        targets = pieces.targets(target)
+        if not (Path(target).is_dir() and all(Path(one).is_relative_to(target) for one in targets)):
+            check_target(target)
+            if is_stream(target):
+                name = "<stdout>" if target == "-" else target
+                several = "a mesh in several files cannot go into a stream"
+                raise WriteError(f"{name}: {several}; name an OUTPUT, or a --format")
+        for path in targets:
+            if Path(path).parent.is_dir():  # else it will be made
+                check_target(path)
+        return
+    check_target(target)
+    if pieces is not None and Path(target).resolve() in [path.resolve() for path in pieces.paths]:
+        raise WriteError(f"{target}: is a piece of the input; name another OUTPUT")
 
 
 def output_format(document: Document, target: str, name: str | None = None) -> Format:

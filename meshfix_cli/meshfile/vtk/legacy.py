@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import InPlace, Places
+from meshfix_cli.meshfile.tables import chain
 from meshfix_cli.meshfile.vtk.cells import TYPES, Run, markings, runs
 from meshfix_cli.meshfile.vtk.sections import Array, Sections, find_sections
 
@@ -146,20 +147,7 @@ def _starts(numbers: Integers, count: int, types: Integers | None) -> NDArray[np
         ends = np.cumsum(sizes + 1)
         if sizes.all() and ends[-1:] == len(numbers) and (numbers[ends - sizes - 1] == sizes).all():
             return ends - sizes - 1
-    return _chain(numbers, count)
-
-
-def _chain(numbers: Integers, count: int) -> NDArray[np.int64]:
-    """The same, step by step: each number tells where the next one is."""
-    starts, at, view = [], 0, numbers.data
-    for _ in range(count):
-        if at >= len(view) or view[at] < 0:
-            break
-        starts.append(at)
-        at += view[at] + 1
-    if len(starts) != count or at != len(view):
-        raise ReadError("is not a readable vtk file: the numbers of vertices of its cells do not add up")
-    return np.array(starts, dtype=np.int64)
+    return chain(numbers, count, "numbers of vertices of its cells")
 
 
 def _types(sizes: NDArray[np.int64], other: int, known: dict[int, int]) -> NDArray[np.int64]:

@@ -1,0 +1,158 @@
+"""OpenFOAM's meshes: a folder polyMesh with lists of points, of faces, and of the cells on both sides of each face.
+
+Only `points` changes. A case, a region of it, or the empty .foam file that stands for a case are as good as the folder.
+
+Source: OpenFOAM User Guide, "Mesh description", "Mesh files", "Boundaries"; OpenFOAM, "ZoneMesh.C".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from meshfix_cli.errors import ReadError, naming
+from meshfix_cli.meshfile.faces import Faces
+from meshfix_cli.meshfile.openfoam.lists import File
+from meshfix_cli.meshfile.source import Cells, Source
+from meshfix_cli.meshfile.splice import InPlace, Places, Points, Turned
+from meshfix_cli.meshfile.tables import Int64, Runs
+from meshfix_cli.meshfile.together import Together
+
+SUFFIX = ".foam"
+_ZONE = "openfoam:zone"
+_SIZES = {3: "triangle", 4: "quad"}
+_RANGE = re.compile(rb"\b(nFaces|startFace)\s+(\d{1,18})\s*;")
+
+
+def folder_of(path: Path) -> Path:
+    """Return where the mesh is that a folder, or a file in it, stands for; ReadError where there is none."""
+    base = path if path.is_dir() else path.parent
+    for folder in (base / "constant" / "polyMesh", base / "polyMesh", base):
+        if _file(folder, "points") and _file(folder, "faces"):
+            return folder
+    raise ReadError("holds no mesh that is read as a folder: there is no constant/polyMesh of OpenFOAM in it")
+
+
+def parse(_: bytes, path: Path | None) -> Source:
+    """Read the mesh that a path stands for."""
+    if path is None:
+        raise ReadError("is a file of OpenFOAM, whose meshes are folders: name the folder, or the case")
+    folder = folder_of(path)
+    points = _file(folder, "points")
+    assert points is not None
+    marked = [path] if path.suffix == SUFFIX else []
+    copied = [one for one in sorted(folder.rglob("*")) if one.is_file() and one != points]
+
+    def places(target: Path) -> list[Path]:
+        there = target / "constant" / "polyMesh" if target.name != "polyMesh" else target
+        if target.suffix == SUFFIX:
+            there = target.parent / "constant" / "polyMesh"
+        return [*(there / one.relative_to(folder) for one in (points, *copied)), *([target] if marked else [])]
+
+    def read(contents: Sequence[bytes]) -> Source:
+        return _source(File.of(contents[0]), folder)
+
+    source = read([points.read_bytes()])
+    layout = source.layout
+    assert isinstance(layout, InPlace)
+
+    def contents(original: Points, moved: Points, turned: Mapping[int, Turned]) -> list[bytes]:
+        return [layout.rewritten(original, moved, turned)]
+
+    pieces = Together(path, [points], layout, contents, read, [*copied, *marked], places)
+    return replace(source, layout=None, pieces=pieces)
+
+
+def _file(folder: Path, name: str) -> Path | None:
+    return folder / name if (folder / name).is_file() else None
+
+
+def _read(folder: Path, name: str) -> File | None:
+    path = _file(folder, name)
+    if path is None:
+        return None
+    with naming(name):
+        return File.of(path.read_bytes())
+
+
+def _source(points: File, folder: Path) -> Source:
+    """Join the coordinates with what the other files of a folder tell about them."""
+    with naming("points"):
+        coordinates = points.vectors()
+    faces, runs = _faces(folder, len(coordinates.begin)), Runs()
+    zones = list(_zones(folder, "cellZones"))
+    zone_of = np.zeros(int(max(faces.owner.max(initial=-1), faces.neighbour.max(initial=-1))) + 1, dtype=np.int64)
+    for number, (name, cells) in enumerate(zones, start=1):
+        if len(cells) and not 0 <= cells.min() <= cells.max() < len(zone_of):
+            raise ReadError(f"cellZones: {name} names a cell that is not there")
+        zone_of[cells] = number
+    for kind, vertices, ids in faces.cells():
+        for name, cells in zones:
+            runs.put(name, len(runs.cells), np.flatnonzero(np.isin(ids, cells)))
+        runs.add(Cells(kind, vertices, ids), _no_corners, {_ZONE: zone_of[ids]})
+    for name, some in (*_patches(folder), *_zones(folder, "faceZones")):
+        _add_facets(runs, faces, name, some)
+    point_sets = dict(_zones(folder, "pointZones"))
+    layout = InPlace(points.data, coordinates, runs.corners)
+    regions = (_ZONE,) * (len(zones) > 0)
+    return Source(coordinates.read(points.data), runs.cells, layout, lambda: runs.arrays(point_sets), regions)
+
+
+def _faces(folder: Path, n: int) -> Faces:
+    def read(name: str, what: Callable[[File], tuple[Int64, Any]]) -> tuple[Int64, Any]:
+        file = _read(folder, name)
+        if file is None:
+            raise ReadError(f"is not a readable mesh of OpenFOAM: there is no file {name}")
+        with naming(name):
+            return what(file)
+
+    offsets, vertices = read("faces", File.faces)
+    owner, neighbour = (read(name, File.labels)[0] for name in ("owner", "neighbour"))
+    count = len(offsets) - 1
+    if len(owner) != count or len(neighbour) > count or (owner < 0).any() or (np.diff(offsets) < 3).any():
+        raise ReadError("is not a readable mesh of OpenFOAM: faces, owner and neighbour do not fit")
+    if len(vertices) and not 0 <= vertices.min() <= vertices.max() < n:
+        raise ReadError("is not a readable mesh of OpenFOAM: a face names a point that is not there")
+    outside = np.full(count - len(neighbour), -1)
+    return Faces(offsets, vertices, owner, np.concatenate([np.maximum(neighbour, -1), outside]))
+
+
+def _patches(folder: Path) -> Iterator[tuple[str, Int64]]:
+    """Give the names and the faces of the parts of the boundary."""
+    file = _read(folder, "boundary")
+    for name, text, _ in file.blocks() if file else ():
+        found = {key: int(number) for key, number in _RANGE.findall(text)}
+        if len(found) == 2:
+            yield name, found[b"startFace"] + np.arange(min(found[b"nFaces"], len(file.data) if file else 0))
+
+
+def _zones(folder: Path, name: str) -> Iterator[tuple[str, Int64]]:
+    """Give the names and the members of the zones of one kind."""
+    file = _read(folder, name)
+    if file is None:
+        return
+    with naming(name):
+        yield from ((zone, members) for zone, _, members in file.blocks())
+
+
+def _add_facets(runs: Runs, faces: Faces, name: str, some: Int64) -> None:
+    """Take the faces of a patch or zone for cells, so that they are found by its name."""
+    if len(some) and not 0 <= some.min() <= some.max() < len(faces.owner):
+        raise ReadError(f"is not a readable mesh of OpenFOAM: {name} has a face that is not there")
+    sizes = np.diff(faces.offsets)[some]
+    for size, kind in _SIZES.items():
+        if len(mine := some[sizes == size]):
+            vertices = faces.vertices[faces.offsets[mine][:, None] + np.arange(size)]
+            runs.add(Cells(kind, vertices), _no_corners, sets=(name,))
+    if len(mine := some[~np.isin(sizes, tuple(_SIZES))]):
+        loops = [faces.vertices[slice(*faces.offsets[face : face + 2])] for face in mine.tolist()]
+        runs.add(Cells("polygon", loops), _no_corners, sets=(name,))
+
+
+def _no_corners() -> Places:
+    raise ReadError("has cells that are made of faces, of which none can be renumbered alone")

@@ -1,0 +1,101 @@
+"""A mesh whose parts lie in several files, of which each knows something else: points here, elements there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from meshfix_cli.errors import WriteError
+from meshfix_cli.meshfile.source import Layout, Source
+from meshfix_cli.meshfile.splice import Points, Turned
+
+Contents = Callable[[Points, Points, Mapping[int, Turned]], list[bytes]]
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """The files of such a mesh; see `source.Pieces`.
+
+    Attributes
+    ----------
+    main : Path
+        What the user names.
+    changed : sequence of Path
+        The files that may change.
+    layout : Layout
+        Of what they hold, as one.
+    contents : callable
+        (points as read, other points, cells to be turned) -> the bytes of each of `changed`.
+    parse : callable
+        Reads such bytes.
+    copied : sequence of Path
+        Files that go with them as they are.
+    places : callable
+        (OUTPUT as a path) -> where each of `paths` goes; default: `beside`.
+    renamed : callable
+        (the bytes of each of `changed`, the names of `places`) -> the same, where files name one another.
+    """
+
+    main: Path
+    changed: Sequence[Path]
+    layout: Layout
+    contents: Contents
+    parse: Callable[[Sequence[bytes]], Source]
+    copied: Sequence[Path] = ()
+    places: Callable[[Path], Sequence[Path]] | None = None
+    renamed: Callable[[list[bytes], Sequence[str]], list[bytes]] = lambda contents, _: contents
+
+    @property
+    def paths(self) -> list[Path]:
+        """Where the files are."""
+        return [*self.changed, *self.copied]
+
+    def targets(self, target: str) -> list[str]:
+        """Return where the files of an output go: those of the input are replaced only where it is the input.
+
+        Raises
+        ------
+        WriteError
+            One of them would be replaced by another.
+        """
+        if self._in_place(target):
+            return [str(path) for path in self.changed]
+        there = Path(target)
+        found = self.places(there) if self.places else beside(self.main, there, self.paths)
+        for path in found:
+            if path.resolve() in {one.resolve() for one in self.paths}:
+                raise WriteError(f"{target}: {path.name} would replace a file of the input; name another OUTPUT")
+        return [str(path) for path in found]
+
+    def _in_place(self, target: str) -> bool:
+        return Path(target).exists() and Path(target).samefile(self.main)
+
+    def rounded(self, points: Points) -> Points:
+        """Return points (n, d) as the files can hold them."""
+        return self.layout.rounded(points)
+
+    def turned(self, original: Points, cells: Mapping[int, Turned], threads: int) -> Source:
+        """Return what the files hold with some cells turned."""
+        return self.parse(self.contents(original, original, cells))
+
+    def files(self, target: str, original: Points, points: Points) -> Iterator[tuple[str, bytes]]:
+        """Give names and contents of the files of an output, the first of them last; in place only what changes."""
+        targets, contents = self.targets(target), self.contents(original, points, {})
+        if self._in_place(target):
+            pairs = zip(targets, contents, strict=True)
+            yield from reversed([(name, data) for name, data in pairs if data != Path(name).read_bytes()])
+            return
+        contents = self.renamed(contents, [Path(name).name for name in targets])
+        copies = [path.read_bytes() for path in self.copied]
+        yield from reversed(list(zip(targets, [*contents, *copies], strict=True)))
+
+
+def beside(main: Path, target: Path, paths: Sequence[Path]) -> list[Path]:
+    """Return where files go that are named after the main one, or not: beside an output, named after that."""
+    names = []
+    for path in paths:
+        rest = path.name.removeprefix(main.stem)
+        named_after = rest != path.name and not rest[:1].isalnum()
+        names.append(target.name if path == main else f"{target.stem}{rest if named_after else f'_{path.name}'}")
+    return [target.parent / name for name in names]

@@ -115,6 +115,11 @@ def _openfoam(_: bytes, text: str) -> Format | None:
     return Format("openfoam") if re.search(r"^FoamFile\s*\{", text, re.MULTILINE) else None
 
 
+def _by_extension(_: bytes, __: str) -> Format | None:
+    """Numbers alone tell nothing."""
+    return None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin"))
 
@@ -132,6 +137,7 @@ OWN = {
     "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}),
     "obj": Own("obj", _obj, {".obj": "obj"}),
     "openfoam": Own("openfoam", _openfoam, {".foam": "openfoam"}, beside=True),
+    "tetgen": Own("tetgen", _by_extension, {".node": "tetgen", ".ele": "tetgen"}, beside=True),
     "su2": Own("su2", _su2, {".su2": "su2"}),
 }
 

@@ -50,8 +50,6 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
         _refuse(foreign.misread(data, form))
         _refuse(_unknown_elements(data) if form.name == "mdpa" else None)
         _refuse(_several_zones(path) if form.name == "cgns" else None)
-        for one in (".node", ".ele") if form.name == "tetgen" else ():
-            _refuse(foreign.without_counts(path.with_suffix(one).read_bytes()))
         mesh = meshio.read(path, file_format=form.reader)
         _refuse(foreign.missing_cells(data, form, sum(len(block.data) for block in mesh.cells)))
         return _source(mesh, data, form)

@@ -28,7 +28,7 @@ class Together:
     contents : callable
         (points as read, other points, cells to be turned) -> the bytes of each of `changed`.
     parse : callable
-        Reads such bytes.
+        Reads such bytes: a source with a layout of this kind.
     copied : sequence of Path
         Files that go with them as they are.
     places : callable

@@ -55,17 +55,14 @@ def parse(_: bytes, path: Path | None) -> Source:
         return [*(there / one.relative_to(folder) for one in (points, *copied)), *([target] if marked else [])]
 
     def read(contents: Sequence[bytes]) -> Source:
-        return _source(File.of(contents[0]), folder)
+        source, layout = _source(File.of(contents[0]), folder)
 
-    source = read([points.read_bytes()])
-    layout = source.layout
-    assert isinstance(layout, InPlace)
+        def written(original: Points, moved: Points, turned: Mapping[int, Turned]) -> list[bytes]:
+            return [layout.rewritten(original, moved, turned)]
 
-    def contents(original: Points, moved: Points, turned: Mapping[int, Turned]) -> list[bytes]:
-        return [layout.rewritten(original, moved, turned)]
+        return replace(source, pieces=Together(path, [points], layout, written, read, [*copied, *marked], places))
 
-    pieces = Together(path, [points], layout, contents, read, [*copied, *marked], places)
-    return replace(source, layout=None, pieces=pieces)
+    return read([points.read_bytes()])
 
 
 def _file(folder: Path, name: str) -> Path | None:
@@ -80,7 +77,7 @@ def _read(folder: Path, name: str) -> File | None:
         return File.of(path.read_bytes())
 
 
-def _source(points: File, folder: Path) -> Source:
+def _source(points: File, folder: Path) -> tuple[Source, InPlace]:
     """Join the coordinates with what the other files of a folder tell about them."""
     with naming("points"):
         coordinates = points.vectors()
@@ -100,7 +97,7 @@ def _source(points: File, folder: Path) -> Source:
     point_sets = dict(_zones(folder, "pointZones"))
     layout = InPlace(points.data, coordinates, runs.corners)
     regions = (_ZONE,) * (len(zones) > 0)
-    return Source(coordinates.read(points.data), runs.cells, layout, lambda: runs.arrays(point_sets), regions)
+    return Source(coordinates.read(points.data), runs.cells, None, lambda: runs.arrays(point_sets), regions), layout
 
 
 def _faces(folder: Path, n: int) -> Faces:

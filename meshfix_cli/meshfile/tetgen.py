@@ -1,0 +1,111 @@
+"""TetGen's and Triangle's files: points in a .node, elements beside it in an .ele, each line with a number of its own.
+
+The first line of both tells how many lines and columns follow. Facets of a .face or .edge with a marker are cells too.
+
+Source: H. Si, "TetGen, User's Manual", section "File formats"; J. R. Shewchuk, "Triangle", ".node files", ".ele files".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from meshfix_cli.errors import ReadError, naming
+from meshfix_cli.meshfile.source import Cells, Source
+from meshfix_cli.meshfile.splice import InPlace, Places
+from meshfix_cli.meshfile.tables import Lines, Numbering, Runs, lines, without
+from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
+from meshfix_cli.meshfile.together import Together
+
+_COMMENT = re.compile(rb"#[^\n\r]*")
+_REF = "tetgen:ref"
+_TYPES = {(2, 3): "triangle", (2, 6): "triangle6", (3, 4): "tetra", (3, 10): "tetra10"}
+_FACETS = {".face": ("triangle", 3), ".edge": ("line", 2)}
+_COPIED = (".face", ".edge", ".neigh", ".poly", ".smesh", ".mtr", ".vol", ".area", ".t2f", ".f2e", ".t2e", ".v.node")
+
+
+def parse(_: bytes, path: Path | None) -> Source:
+    """Read a mesh by the name of one of its two files."""
+    if path is None:
+        raise ReadError("is one of two files, .node and .ele, so it is read from its file and not from a stream")
+    changed = [path.with_suffix(suffix) for suffix in (".node", ".ele")]
+    for one in changed:
+        if not one.is_file():
+            raise ReadError(f"{one.name}, which belongs to it, is not there")
+    copied = [one for suffix in _COPIED if (one := path.with_suffix(suffix)).is_file()]
+    facets = {one.suffix: one.read_bytes() for one in copied if one.suffix in _FACETS}
+
+    def places(target: Path) -> list[Path]:
+        return [target.with_suffix(one.suffix) for one in (*changed, *copied)]
+
+    def read(contents: Sequence[bytes]) -> Source:
+        source, layout = _source(contents[0], contents[1], facets)
+        written = partial(layout.divided, bounds=[len(contents[0])])
+        return replace(source, pieces=Together(path, changed, layout, written, read, copied, places))
+
+    return read([one.read_bytes() for one in changed])
+
+
+def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple[Source, InPlace]:
+    with naming(".node"):
+        (dimension, *_), table = _table(nodes, 2)
+        if dimension not in (2, 3):
+            raise ReadError(f"its points have {dimension} coordinates")
+        coordinates = Places.of_text(table.columns(1, 1 + dimension))
+        points, numbering = coordinates.read(nodes), Numbering(table.integers(0, 1)[:, 0])
+    runs = Runs()
+    with naming(".ele"):
+        (corners, attributes, *_), table = _table(elements, 2)
+        kind = _TYPES.get((dimension, corners))
+        if kind is None:
+            raise ReadError(f"its elements have {corners} nodes in {dimension} dimensions")
+        rows = table.integers(0, 1 + corners)
+        labels = {}
+        if attributes > 0:
+            column = table.columns(1 + corners, 2 + corners)[:, 0]
+            labels[_REF] = numbers_at(table.text, column, np.dtype("f8"))
+        cells = Cells(kind, numbering.points_of(rows[:, 1:], rows[:, 0]), rows[:, 0])
+        runs.add(cells, partial(_corners, table, corners, len(nodes)), labels)
+    for suffix, data in facets.items():
+        with naming(suffix):
+            _add_facets(runs, data, *_FACETS[suffix], numbering)
+    layout = InPlace(nodes + elements, coordinates, runs.corners)
+    untold = ("comments",) if b"#" in nodes or b"#" in elements else ()
+    return Source(points, runs.cells, None, runs.arrays, (_REF,) * bool(labels), untold=untold), layout
+
+
+def _table(data: bytes, counts: int) -> tuple[list[int], Lines]:
+    """Return what the first line tells, but for the number of lines, and these."""
+    text = without(data, _COMMENT, b"#")
+    head = lines(text, 0, 1)
+    values = integers_at(text, head.spans).tolist()
+    if len(values) < counts:
+        raise in_line(text, head.end, "the first line does not tell how many lines and columns there are")
+    table = lines(text, head.end, values[0])
+    if left := text[table.end :].lstrip():
+        raise in_line(text, len(text) - len(left), "there are more lines than announced")
+    return [*values[1:], 0, 0], table
+
+
+def _corners(table: Lines, count: int, before: int) -> Places:
+    return Places.of_text(table.columns(1, 1 + count) + before, "i8")
+
+
+def _add_facets(runs: Runs, data: bytes, kind: str, corners: int, numbering: Numbering) -> None:
+    """Take the facets that have a marker, which are boundaries and interfaces: others may be inside."""
+    (markers, *_), table = _table(data, 1)
+    if markers < 1:
+        return
+    marks = table.integers(1 + corners, 2 + corners)[:, 0]
+    rows = np.flatnonzero(marks != 0)
+    facets = Cells(kind, numbering.points_of(table.integers(1, 1 + corners, rows)))
+    runs.add(facets, _not_turned, {_REF: marks[rows]})
+
+
+def _not_turned() -> Places:
+    raise ReadError("has facets in a file of their own, which are not renumbered")

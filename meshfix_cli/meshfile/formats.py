@@ -134,7 +134,7 @@ OWN = {
     "vtu": Own("vtk.vtu", _vtu, {".vtu": "vtu"}),
     "ply": Own("ply", _ply, {".ply": "ply"}),
     "medit": Own("medit", _medit, {".mesh": "medit"}),
-    "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}),
+    "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}, beside=True),
     "obj": Own("obj", _obj, {".obj": "obj"}),
     "openfoam": Own("openfoam", _openfoam, {".foam": "openfoam"}, beside=True),
     "tetgen": Own("tetgen", _by_extension, {".node": "tetgen", ".ele": "tetgen"}, beside=True),

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from files_abaqus import FILES, read_independently
+from files_abaqus import FILES, elements, nodes, read_independently
 from files_medit import interior, material, surface
 from shapes import block, plate
 
+from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import dimension_of
 from meshfix_cli.meshfile.abaqus import parse
@@ -155,12 +156,16 @@ def test_numbers_have_twenty_characters() -> None:
 def test_truncated(name: str, tmp_path: Path) -> None:
     data = made(name, tmp_path)
     for cut in {*range(3, len(data) - 10, len(data) // 80), len(data) - 4}:
-        with pytest.raises(ReadError):
-            parse(data[:cut])
+        try:
+            assert parse(data[:cut]).notes == ("its last line does not end, as if the file had been cut there",)
+        except ReadError:
+            continue
+        assert data[:cut].rpartition(b"\n")[2].count(b",") == data[:cut].splitlines()[-2].count(b",")
 
 
 def test_truncated_within_a_line_or_an_element() -> None:
-    for cut in range(1, 12):
+    assert parsed(SMALL[:-1]).notes == ("its last line does not end, as if the file had been cut there",)
+    for cut in range(2, 12):
         with pytest.raises(ReadError, match=r"is truncated"):
             parse(SMALL[:-cut])
     with pytest.raises(ReadError, match="the element 2 names the node 50"):
@@ -175,7 +180,6 @@ def test_truncated_within_a_line_or_an_element() -> None:
         (b"*nfill\n", "NFILL"),
         (b"*ELGEN\n1, 4\n", "ELGEN"),
         (b"*ELCOPY\n", "ELCOPY"),
-        (b"*Include, input=mesh.inp\n", "INCLUDE"),
         (b"*SYSTEM\n1., 0.\n", "SYSTEM"),
         (b"*NODE, INPUT=nodes.txt\n", "NODE"),
         (b"*NODE, SYSTEM=C\n60, 1., 30.\n", "NODE"),
@@ -264,7 +268,7 @@ def test_elements_whose_faces_are_named_are_not_renumbered() -> None:
 
 def test_files_may_be_included_by_steps() -> None:
     assert len(parsed(SMALL + b"*STEP\n*INCLUDE, INPUT=loads.inp\n*END STEP\n").points) == 5
-    with pytest.raises(ReadError, match=r"uses \*INCLUDE"):
+    with pytest.raises(ReadError, match=r"includes mesh\.inp, which is beside it"):
         parsed(SMALL + b"*INCLUDE, INPUT=mesh.inp\n")
 
 
@@ -316,3 +320,58 @@ def test_types(name: str, shape: tuple[str, int]) -> None:
     source = parsed(SMALL + b"*ELEMENT, TYPE=%b\n77, %b\n" % (name.encode(), row))
     assert source.cells[1].type == kind
     assert source.cells[1].vertices.tolist() == [[i % 4 for i in range(corners)]]
+
+
+def split_up(folder: Path) -> Path:
+    """A file that includes its nodes, the second half of which these include, and its elements; and the whole of it."""
+    points, cells = block()
+    ids = np.arange(1, len(points) + 1)
+    rows = nodes(points, ids).splitlines(keepends=True)
+    half, body = len(rows) // 2, elements(cells, ids)
+    step = "*STEP\n*INCLUDE, INPUT=loads.inc\n*END STEP\n"
+    head, type_ = "** a job\n*NODE, NSET=Nall\n", "*ELEMENT, TYPE=C3D4, ELSET=Eall\n"
+    (folder / "whole.inp").write_text(head + "".join(rows) + type_ + body + step)
+    (folder / "nodes.inc").write_text("".join(rows[:half]) + '*Include, Input="more nodes.inc"\n** the end\n')
+    (folder / "more nodes.inc").write_text("*NODE, NSET=Nall\n" + "".join(rows[half:]).rstrip("\n"))
+    (folder / "job_elements.inc").write_text(type_ + body)
+    included = "*INCLUDE,INPUT=nodes.inc\n*include, input = job_elements.inc\n"
+    (folder / "nodes.inc").write_text(head + (folder / "nodes.inc").read_text())
+    (folder / "job.inp").write_text(included + step)
+    return folder / "job.inp"
+
+
+def test_files_that_are_included_are_written_back_one_by_one(tmp_path: Path) -> None:
+    path = split_up(tmp_path)
+    before = {one.name: one.read_bytes() for one in tmp_path.iterdir()}
+    whole, document = read(tmp_path / "whole.inp"), read(path)
+    np.testing.assert_array_equal(document.source.points, whole.source.points)
+    np.testing.assert_array_equal(document.source.cells[0].vertices, whole.source.cells[0].vertices)
+    (tmp_path / "there").mkdir()
+    result = untangle(document.mesh).after
+    write(document, result, tmp_path / "there" / "out.inp")
+    assert {one.name for one in (tmp_path / "there").iterdir()} == {
+        "out.inp", "out_nodes.inc", "out_more nodes.inc", "out_elements.inc",
+    }  # fmt: skip
+    back = read(tmp_path / "there" / "out.inp")
+    np.testing.assert_array_equal(back.source.points, document.file_points(result))
+    main = before["job.inp"].replace(b"=nodes.inc", b"=out_nodes.inc").replace(b"job_elements.inc", b"out_elements.inc")
+    assert (tmp_path / "there" / "out.inp").read_bytes() == main
+    assert b'Input="out_more nodes.inc"\n' in (tmp_path / "there" / "out_nodes.inc").read_bytes()
+    assert (tmp_path / "there" / "out_elements.inc").read_bytes() == before["job_elements.inc"]
+    write(document, result, path)
+    after = {one.name: one.read_bytes() for one in tmp_path.iterdir() if one.is_file()}
+    assert {name for name in before if before[name] != after[name]} == {"nodes.inc", "more nodes.inc"}
+    assert not after["more nodes.inc"].endswith(b"\n")
+
+
+def test_what_is_included_must_be_there(tmp_path: Path) -> None:
+    path = split_up(tmp_path)
+    (tmp_path / "more nodes.inc").rename(tmp_path / "elsewhere")
+    with pytest.raises(ReadError, match=r"includes more nodes\.inc: No such file"):
+        read(path)
+    (tmp_path / "more nodes.inc").write_bytes(b"*INCLUDE, INPUT=nodes.inc\n")
+    with pytest.raises(ReadError, match=r"includes nodes\.inc twice"):
+        read(path)
+    path.write_bytes(SMALL + b"*INCLUDE\n")
+    with pytest.raises(ReadError, match=r"uses \*INCLUDE without INPUT="):
+        read(path)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import re
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.abaqus.include import inclusions, read_together
 from meshfix_cli.meshfile.abaqus.keywords import Block, Deck, read_deck
 from meshfix_cli.meshfile.abaqus.sets import SECTION, Labels, arrays
 from meshfix_cli.meshfile.source import Cells, Source
@@ -33,8 +35,12 @@ _SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10",
 _PLANES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 
 
-def parse(data: bytes) -> Source:
-    """Read nodes and elements; nodes of different parts are different points."""
+def parse(data: bytes, path: Path | None = None) -> Source:
+    """Read nodes and elements, also those of files that are included; nodes of different parts are different points."""
+    return read_together(data, path, _parsed) if inclusions(data) else _parsed(data)
+
+
+def _parsed(data: bytes) -> Source:
     deck = read_deck(data)
     coordinates, nodes = _nodes(deck)
     blocks = [*deck.of("ELEMENT")]
@@ -51,7 +57,7 @@ def parse(data: bytes) -> Source:
     points = coordinates.read(deck.text)
     notes = (
         "instances are not moved to their places in the assembly: coordinates are those of the parts",
-    ) * deck.placed
+    ) * deck.placed + ("its last line does not end, as if the file had been cut there",) * deck.open_end
     untold = ("numbers of nodes and elements", *deck.untold())
     apart = sum(1 for _ in deck.of("PART")) > 1
     return Source(points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes, apart=apart)

@@ -17,7 +17,7 @@ MESH = ("NODE", "ELEMENT", "NSET", "ELSET")
 _BLANK = b" \t\xef\xbb\xbf"  # a mark of the order of bytes is a blank as well
 _STAR = re.compile(rb"\*[^\n]*")
 _CONTINUATION = re.compile(rb"\n\s*[A-Za-z][^\n]*")
-_GENERATING = ("NGEN", "NCOPY", "NFILL", "NMAP", "ELGEN", "ELCOPY", "INCLUDE", "SYSTEM")
+_GENERATING = ("NGEN", "NCOPY", "NFILL", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
 # Abaqus takes the beginning of a word for the word; these are the parameters that are looked at.
 _PARAMETERS = ("ELSET", "GENERATE", "INPUT", "INSTANCE", "NAME", "NSET", "PART", "SYSTEM", "TYPE")
 _NESTED = ("PART", "INSTANCE", "ASSEMBLY", "STEP")
@@ -87,6 +87,12 @@ class Deck:
         return ("comments",) * self.comments + (f"keywords {', '.join(names)}",) * bool(names)
 
     @property
+    def open_end(self) -> bool:
+        """Whether the last line is one of the mesh and does not end, which Abaqus wants: the file may have been cut."""
+        cut = self.text[self.text.rfind(b"\n") + 1 :].strip()
+        return bool(cut and self.blocks and self.blocks[-1].keyword in MESH)
+
+    @property
     def placed(self) -> bool:
         """Whether an instance is moved to its place in the assembly."""
         return any(self.text[block.begin : block.end].strip() for block in self.of("INSTANCE"))
@@ -110,9 +116,8 @@ def read_deck(data: bytes) -> Deck:
     text = _blanked(data, comments) if comments else data
     keywords = [line for line in starred if not data.startswith(b"**", line[1])]
     deck = Deck(text, *_blocks(text, keywords), bool(comments))
-    for i, block in enumerate(deck.blocks):
-        in_step = any(one.keyword == "STEP" for one in deck.blocks[:i]) if block.keyword == "INCLUDE" else False
-        if block.keyword in _GENERATING and not in_step:  # loads may come from other files, the mesh may not
+    for block in deck.blocks:
+        if block.keyword in _GENERATING:
             raise ReadError(f"uses *{block.keyword}, which meshfix does not read")
         if block.keyword in MESH and "INPUT" in block.parameters:
             raise ReadError(f"uses *{block.keyword} with INPUT=, which meshfix does not read")
@@ -140,8 +145,7 @@ def _check_ends(deck: Deck) -> None:
     for keyword in _NESTED:
         if len([*deck.of(keyword)]) > len([*deck.of(f"END {keyword}")]):
             raise ReadError(f"is truncated: there is *{keyword} without *END {keyword}")
-    cut = deck.text[deck.text.rfind(b"\n") + 1 :].strip()
-    if cut and deck.blocks and deck.blocks[-1].keyword in MESH:  # Abaqus wants the end of the last line as well
+    if deck.open_end and len(deck.words(deck.blocks[-1])) == 0:  # the line of the keyword
         raise ReadError("is truncated: its last line does not end")
 
 

@@ -7,8 +7,10 @@ MeshfixError
 └── WriteError          the result cannot be written
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+
+MOST_NAMED = 20  # of things that are listed in one sentence
 
 
 class MeshfixError(Exception):
@@ -34,6 +36,12 @@ class WriteError(MeshfixError):
 def on_one_line(error: object) -> str:
     """Return on one line what another library says of an error."""
     return " ".join(str(error).split())
+
+
+def listed(names: Sequence[str]) -> str:
+    """Name the first of some things, and how many more there are."""
+    more = f" and {len(names) - MOST_NAMED:,} more" * (len(names) > MOST_NAMED)
+    return ", ".join(names[:MOST_NAMED]) + more
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from meshfix_cli.errors import RequirementError, WriteError
+from meshfix_cli.errors import RequirementError, WriteError, listed
 from meshfix_cli.mesh.elements import counted, words
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.solve.perturb import Distance
@@ -36,14 +36,11 @@ if TYPE_CHECKING:
     Steps = Iterator[tuple[Mesh, SweepRecord]]
 
 
-MOST_NAMED = 20  # of what is dropped
-
-
 @dataclass(frozen=True)
 class Held:
     """What is held still beside the boundary, and what is one point: see `reading.read`."""
 
-    fix: str | None = None
+    fix: tuple[str, ...] = ()
     regions: str | None = None
     join_points: bool = False
     input_format: str | None = None
@@ -68,7 +65,7 @@ class Held:
         from meshfix_cli.errors import naming
         from meshfix_cli.mesh.reference import reference_points
 
-        mesh = replace(self, fix=None, regions=None, input_format=None).read(source, threads).mesh
+        mesh = replace(self, fix=(), regions=None, input_format=None).read(source, threads).mesh
         with naming(f"{source}: as a reference"):
             return reference_points(document.mesh, mesh, threads)
 
@@ -121,18 +118,12 @@ class Files:
         stored, dropped = write(document, mesh, self.target, output, self.backup, put)
         if document.is_kept_by(output) or document.is_as_read(stored, output):
             return stored, notes
-        lost = f"; dropped: {_listed(dropped)}" if dropped else ""
+        lost = f"; dropped: {listed(dropped)}" if dropped else ""
         if output.reader != document.format.reader:
             return stored, (*notes, f"converted from {document.format.name} to {output.name}{lost}")
         if not lost and (document.source.data is None or b"\0" in document.source.data):
             lost = ": what it does not know of the input is lost"
         return stored, (*notes, f"written anew as {output.name} by meshio{lost}")
-
-
-def _listed(names: tuple[str, ...]) -> str:
-    """Name the first of some things, and how many more there are."""
-    more = f" and {len(names) - MOST_NAMED} more" * (len(names) > MOST_NAMED)
-    return ", ".join(names[:MOST_NAMED]) + more
 
 
 @dataclass(frozen=True)

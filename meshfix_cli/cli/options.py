@@ -119,6 +119,11 @@ class Show:
         """Return what is to be found out: little where nothing is shown."""
         return Judge(self.metrics, requirements, self.threads, brief=self.quiet and not draw.names)
 
+    def check(self, verbose: bool) -> None:
+        """Refuse to tell more and nothing."""
+        if verbose and self.quiet:
+            raise click.UsageError("--quiet and --verbose exclude each other")
+
     def print(self, report: Report, stream: Any, by_type: bool = False) -> None:
         """Print a report as it is asked for; `by_type`: with a table by types of elements."""
         from meshfix_cli.report.terminal import console, print_json, print_report
@@ -203,8 +208,18 @@ def packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[...,
 holding = packed(
     "held",
     Held,
-    click.option("--fix", metavar="NAME", help="Hold the vertices where this point-data array is not zero."),
-    click.option("--regions", metavar="NAME", help="Hold the interfaces between the regions of this cell-data array."),
+    click.option(
+        "--fix",
+        multiple=True,
+        metavar="NAME",
+        help="Hold the vertices where this point-data array is not zero, or those of this set or group of points or "
+        "cells; may be given more than once. `meshfix quality --verbose` lists groups.",
+    ),
+    click.option(
+        "--regions",
+        metavar="NAME|none",
+        help="Hold the interfaces between the regions of this cell-data array; none: let them move.",
+    ),
     click.option(
         "--input-format", type=_Choice(_readers), metavar="NAME", help="What INPUT is, whatever it looks like."
     ),

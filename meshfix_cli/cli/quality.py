@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 @drawing_cells
 @drawing
 @click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
+@click.option("--verbose", "-v", is_flag=True, help="List the groups and sets of the file, and what they hold.")
 @requiring
 @holding
 @reporting
@@ -31,6 +32,7 @@ def quality(
     cells: str | None,
     draw: Draw,
     everything: bool,
+    verbose: bool,
     requirements: tuple[Requirement, ...],
     held: Held,
     show: Show,
@@ -40,6 +42,7 @@ def quality(
     if beside and len(sources) > 1:
         raise click.UsageError("--cells, --report and --plot take one INPUT")
     draw.check()
+    show.check(verbose)
     codes = set()
     for source in sources:
         try:
@@ -50,7 +53,9 @@ def quality(
             if cells is not None:
                 write_cells(document, document.mesh, cells, show.threads)
             stages = {"mesh": document.mesh}
-            report = show.judge(draw, requirements).report("quality", document, stages, everything=everything)
+            groups = document.groups() if verbose or show.as_json else None
+            judge = show.judge(draw, requirements)
+            report = judge.report("quality", document, stages, everything=everything, groups=groups)
             draw.write(report, show.threads)
         except MeshfixError as error:
             complain(str(error))

@@ -78,8 +78,7 @@ def untangle(
     from meshfix_cli.report.as_json import history_csv
     from meshfix_cli.report.terminal import console, with_progress
 
-    if verbose and show.quiet:
-        raise click.UsageError("--quiet and --verbose exclude each other")
+    show.check(verbose)
     if reference is not None:
         _check_reference(reference, method)
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:

@@ -236,6 +236,12 @@ def words(key: str) -> tuple[str, str]:
     return f"{element.shape.name}{order}", f"{element.shape.plural}{order}"
 
 
+def role(dimension: int, of: int) -> tuple[str, str]:
+    """Return what one cell, and what several, of a dimension are called in a mesh of a dimension."""
+    lower = {0: ("vertex", "vertices"), 1: ("edge", "edges"), 2: ("face", "faces")}
+    return lower[dimension] if dimension < of else ("element", "elements")
+
+
 def counted(number: int, singular: str, plural: str) -> str:
     """Return a number with the word for what it counts."""
     return f"{number:,} {singular if number == 1 else plural}"

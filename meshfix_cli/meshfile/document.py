@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,16 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.errors import InvalidMeshError, ReadError
+from meshfix_cli.errors import InvalidMeshError, ReadError, listed
 from meshfix_cli.mesh.elements import counted, dimension_of
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import DRAWINGS, Format
+from meshfix_cli.meshfile.groups import groups_of
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned
+
+FREE = "none"  # the name of no array of regions, by which interfaces are freed
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,10 @@ class Document:
     def parts(self) -> tuple[Part, ...]:
         """The elements of the mesh, without repetitions, with their vertices as the file numbers them."""
         return self.solved.some(self.mesh.topology.source)
+
+    def groups(self) -> dict[str, dict[int, int]]:
+        """Return how many cells each group of the file has, by name and by dimension, see `groups.Group.counts`."""
+        return {name: group.counts for name, group in groups_of(self.source).items()}
 
     def outputs(self, target: str, form: Format) -> tuple[str, ...]:
         """Return the names of the files that an output in a format has; WriteError where it cannot be."""
@@ -156,14 +163,15 @@ def build(
     name: str,
     source: Source,
     form: Format,
-    fix: str | None,
+    fix: Sequence[str],
     regions: str | None,
     join_points: bool = False,
     threads: int = 1,
 ) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
     solved = _solved(source)
-    if regions is not None:
+    free = regions == FREE and FREE not in source.arrays.cell
+    if regions is not None and not free:
         source = _with_regions(source, regions)
     points, basis = _solved_points(source, solved)
     copies = _copies(points, solved) if join_points else None
@@ -172,14 +180,13 @@ def build(
     held = {"on other cells of the file": _on_other_cells(solved, len(points))}
     if source.held is not None:
         held["by the file"] = source.held
-    if fix is not None:
-        held[f"by --fix {fix}"] = _fixed_by(source, fix)
+    held |= {f"by --fix {one}": _fixed_by(source, one) for one in fix}
     mesh = replace(Mesh.build(points, solved.blocks, threads=threads), apart=source.apart)
     if not source.oriented:  # the numbering says nothing
         mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
     topology = mesh.topology
     reasons = {"on the boundary": topology.boundary}
-    for key in source.regions:
+    for key in () if free else source.regions:
         labels = solved.of_elements(source.arrays.cell[key])
         if key not in REGIONS and key != regions and not _are_labels(labels):
             continue
@@ -303,11 +310,18 @@ def _on_other_cells(solved: Solved, n: int) -> NDArray[np.bool_]:
 
 
 def _fixed_by(source: Source, name: str) -> NDArray[np.bool_]:
-    if name not in source.arrays.point:
-        known = ", ".join(sorted(source.arrays.point)) or "none"
-        raise ReadError(f"there is no point data named {name!r} (found: {known})")
-    values = np.asarray(source.arrays.point[name])
-    return (values.reshape(len(values), -1) != 0).any(axis=1)
+    """Mark the points (n,) that an array or, where there is none of this name, a group holds."""
+    if name in source.arrays.point:
+        values = np.asarray(source.arrays.point[name])
+        return (values.reshape(len(values), -1) != 0).any(axis=1)
+    groups = groups_of(source)
+    if name not in groups:
+        known = listed(sorted({*source.arrays.point, *groups})) or "none"
+        raise ReadError(f"there is no point data, set or group named {name!r} (found: {known})")
+    points = groups[name].points
+    mask = np.zeros(len(source.points), dtype=bool)
+    mask[points[(points >= 0) & (points < len(mask))]] = True
+    return mask
 
 
 def _region_codes(labels: NDArray[Any], solved: Solved, topology: Topology) -> NDArray[np.int64]:
@@ -326,7 +340,7 @@ def _region_codes(labels: NDArray[Any], solved: Solved, topology: Topology) -> N
 def _with_regions(source: Source, name: str) -> Source:
     """Let another array tell the regions apart; what has been read is not read again."""
     if name not in source.arrays.cell:
-        known = ", ".join(sorted(source.arrays.cell)) or "none"
+        known = listed(sorted(source.arrays.cell)) or "none"
         raise ReadError(f"there is no cell data named {name!r} (found: {known})")
     return replace(source, regions=(name,), load=lambda: source.arrays)
 

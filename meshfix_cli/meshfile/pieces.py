@@ -106,6 +106,7 @@ def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:
     runs = [(i, number) for i, source in enumerate(sources) for number in range(len(source.cells))]
     origins = [_Origin(*run, here) for run, here in zip(runs, kept, strict=True)]
     cells = [_some(run, here) for run, here in zip(cells, kept, strict=True)]
+    by_piece = np.split(rows, starts[1:-1])
     common = int((np.bincount(rows) > 1).sum())
     how = "equal coordinates" if numbers is None else family.numbers
     files, points_of_several = counted(len(sources), "file", "files"), counted(common, "common point", "common points")
@@ -113,12 +114,12 @@ def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:
     return Source(
         points[chosen],
         cells,
-        load=lambda: _arrays(sources, chosen, origins),
+        load=lambda: _arrays(sources, by_piece, chosen, origins),
         regions=_regions(family, sources),
         held=ghost_vertices(cells, len(chosen)),
         untold=_distinct(source.untold for source in sources),
         notes=(note, *_distinct(source.notes for source in sources)),
-        pieces=Joined(family, sources, np.split(rows, starts[1:-1]), origins),
+        pieces=Joined(family, sources, by_piece, origins),
     )
 
 
@@ -215,8 +216,8 @@ def _regions(family: Family, sources: Sequence[Source]) -> tuple[str, ...]:
     return regions
 
 
-def _arrays(sources: Sequence[Source], chosen: Int64, origins: Sequence[_Origin]) -> Arrays:
-    """The arrays that all pieces have, of the points and cells of the mesh."""
+def _arrays(sources: Sequence[Source], rows: Sequence[Int64], chosen: Int64, origins: Sequence[_Origin]) -> Arrays:
+    """The arrays that all pieces have, and the sets that any has, of the points and cells of the mesh."""
     filled = _filled(sources)
     point, lost = _common([source.arrays.point for source in filled])
     full = [i for i, source in enumerate(sources) if source.cells]
@@ -230,8 +231,27 @@ def _arrays(sources: Sequence[Source], chosen: Int64, origins: Sequence[_Origin]
         {name: np.concatenate([source.arrays.point[name] for source in filled])[chosen] for name in point},
         {name: [sources[one.piece].arrays.cell[name][one.run][one.rows] for one in origins] for name in cell},
         groups,
+        _point_sets(sources, rows),
+        _cell_sets(sources, origins),
         unread=_distinct([*(source.arrays.unread for source in sources), unread]),
     )
+
+
+def _point_sets(sources: Sequence[Source], rows: Sequence[Int64]) -> dict[str, Int64]:
+    sets: dict[str, list[Int64]] = {}
+    for source, here in zip(sources, rows, strict=True):
+        for name, points in source.arrays.point_sets.items():
+            sets.setdefault(name, []).append(here[points])
+    return {name: np.unique(np.concatenate(parts)) for name, parts in sets.items()}
+
+
+def _cell_sets(sources: Sequence[Source], origins: Sequence[_Origin]) -> dict[str, list[Int64]]:
+    sets: dict[str, list[Int64]] = {}
+    for i, one in enumerate(origins):
+        for name, runs in sources[one.piece].arrays.cell_sets.items():
+            mine = sets.setdefault(name, [np.empty(0, dtype=np.int64)] * len(origins))
+            mine[i] = np.flatnonzero(np.isin(one.rows, runs[one.run]))
+    return sets
 
 
 def _common(tables: Sequence[Mapping[str, NDArray[Any]]]) -> tuple[list[str], list[str]]:

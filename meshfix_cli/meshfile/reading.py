@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import stat
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from importlib import import_module
@@ -27,7 +27,7 @@ from meshfix_cli.meshfile.splice import Turned
 
 def read(
     path: str | os.PathLike[str],
-    fix: str | None = None,
+    fix: str | Sequence[str] | None = None,
     regions: str | None = None,
     *,
     double: bool = False,
@@ -42,10 +42,12 @@ def read(
     ----------
     path : str or path
         "-" reads stdin; one that has a `*`, and is no file, reads the parts of a mesh whose names fit.
-    fix : str, optional
-        Name of a point-data array; vertices where it is not zero are held.
+    fix : str or sequence of str, optional
+        Names of point-data arrays, whose vertices are held where they are not zero, and of sets and groups of points
+        or cells, whose vertices are held.
     regions : str, optional
-        Name of a cell-data array; the interface between regions is held. Default: those of `Source.regions`.
+        Name of a cell-data array; the interface between regions is held. "none": none is. Default: those of
+        `Source.regions`.
     double : bool
         Make coordinates in float32 those of a file in float64.
     fix_orientation : bool
@@ -66,9 +68,10 @@ def read(
     use_threads(threads)
     streamed = os.fspath(path) == "-"
     name = "<stdin>" if streamed else os.fspath(path)
+    names = (fix,) if isinstance(fix, str) else tuple(fix or ())
 
     def built(source: Source, found: Format) -> Document:
-        return build(name, source, found, fix, regions, join_points, threads)
+        return build(name, source, found, names, regions, join_points, threads)
 
     with naming(name):
         source, found = _open(None if streamed else Path(name), double, form, threads)

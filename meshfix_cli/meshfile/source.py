@@ -17,8 +17,9 @@ from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.splice import InPlace, Points, Turned
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
+PHYSICAL = "gmsh:physical"  # whose numbers `Arrays.groups` names
 REGIONS = (
-    "gmsh:physical", "gmsh:physical_set", "medit:ref", "cell_tags", "abaqus:section", "obj:material", "stl:solid",
+    PHYSICAL, "gmsh:physical_set", "medit:ref", "cell_tags", "abaqus:section", "obj:material", "stl:solid",
     "nastran:ref", "avsucd:material", "exodus:block", "flac3d:group", "netgen:index", "tetgen:ref", "ugrid:ref",
     "MaterialIDs", "CellEntityIds", "RegionId",
 )  # fmt: skip

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any
 
 from meshfix_cli import __version__
+from meshfix_cli.mesh.elements import role
 from meshfix_cli.quality.metrics import NUMBERS, having
 from meshfix_cli.quality.summary import Kind, Summary
 from meshfix_cli.report.facts import Report, binned, first_inverted
@@ -52,8 +53,18 @@ def to_json(report: Report) -> dict[str, Any]:
             {"requirement": str(one), "value": _finite(one.value(report.result)), "met": one.holds(report.result)}
             for one in report.requirements
         ],
+        **({} if report.groups is None else {"groups": list(_groups_json(report.groups, mesh))}),
         **(report.facts or {}),
     }
+
+
+def _groups_json(groups: Mapping[str, Mapping[int, int]], mesh: Mesh) -> Iterator[dict[str, Any]]:
+    """Give an object for each kind of cells in each group; of one that is empty the kind may not be known."""
+    for name, counts in groups.items():
+        for dimension, number in counts.items():
+            yield {"name": name, "kind": role(dimension, mesh.dimension)[0], "dimension": dimension, "number": number}
+        if not counts:
+            yield {"name": name, "kind": None, "dimension": None, "number": 0}
 
 
 def batch_json(options: Mapping[str, Any], files: Sequence[Mapping[str, Any]], total: int) -> str:

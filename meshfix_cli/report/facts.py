@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, words
+from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, role, words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.quality.requirement import Requirement
@@ -69,6 +69,8 @@ class Report:
         What the user asks of the result.
     everything : bool
         List all inverted elements, not only the first.
+    groups : dict or None
+        For each group of the file the number of its cells by their dimension; None: nobody asked.
     """
 
     name: str
@@ -86,6 +88,7 @@ class Report:
     facts: Mapping[str, Any] | None = None
     requirements: Sequence[Requirement] = ()
     everything: bool = False
+    groups: Mapping[str, Mapping[int, int]] | None = None
 
     @property
     def mesh(self) -> Mesh:
@@ -405,6 +408,17 @@ def not_judged(report: Report) -> str:
     if not named:
         return ""
     return f"{' and '.join(named)} {'is' if sum(report.not_judged.values()) == 1 else 'are'} held and not judged"
+
+
+def groups(report: Report) -> Iterator[str]:
+    """Name the groups that hold something, if somebody asked for them."""
+    if report.groups is None:
+        return
+    named = []
+    for name, counts in report.groups.items():
+        some = [counted(n, *role(dimension, report.mesh.dimension)) for dimension, n in counts.items() if n]
+        named += [f"{name} ({', '.join(some)})"] * bool(some)
+    yield f"groups: {', '.join(named) or 'none'}"
 
 
 def required(report: Report) -> Iterator[tuple[bool, str]]:

@@ -21,6 +21,7 @@ from meshfix_cli.report.facts import (
     Tally,
     before_and_after,
     binned,
+    groups,
     kind_rows,
     phases,
     processes,
@@ -60,7 +61,7 @@ def print_report(report: Report, out: Console, by_type: bool = False) -> None:
     types, rows = kind_rows(report)
     if by_type and types:
         _print_table(out, types, rows)
-    for text in phases(report):
+    for text in (*groups(report), *phases(report)):
         _line(out, text)
     for rank, text in enumerate(processes(report)):
         _line(out, f"process {rank}: {text}")

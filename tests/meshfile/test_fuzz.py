@@ -93,6 +93,7 @@ def check(path: Path, data: bytes) -> None:
     tracemalloc.start()
     try:
         document = read(path)
+        document.groups()
         _, peak = tracemalloc.get_traced_memory()
         assert peak <= MEMORY * len(data) + MARGIN
         outcome = untangle(document.mesh, sweeps=2, smooth=1)

@@ -155,7 +155,7 @@ def test_fix_and_regions_name_arrays(tmp_path: Path, plate: Mesh) -> None:
     assert not document.mesh.movable[chosen].any()
     assert document.fixed["by --fix hold"] == 3
     assert document.fixed["between regions of part"] > 3
-    with pytest.raises(ReadError, match=r"no point data named 'nope' \(found: hold\)"):
+    with pytest.raises(ReadError, match=r"no point data, set or group named 'nope' \(found: hold\)"):
         read(path, fix="nope")
     with pytest.raises(ReadError, match=r"no cell data named 'nope' \(found: part\)"):
         read(path, regions="nope")

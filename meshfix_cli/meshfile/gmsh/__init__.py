@@ -14,15 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, naming
-from meshfix_cli.mesh.elements import counted
+from meshfix_cli.mesh.elements import counted, dimension_of
 from meshfix_cli.meshfile.gmsh.cells import ORDER, TYPES
 from meshfix_cli.meshfile.gmsh.numbers import Int64
 from meshfix_cli.meshfile.gmsh.sections import Block, File, Numbers, UnknownError, read
 from meshfix_cli.meshfile.solved import solved_runs
-from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 
-_PHYSICAL, _SETS, _ENTITY = "gmsh:physical", "gmsh:physical_set", "gmsh:geometrical"
+_SETS, _ENTITY = "gmsh:physical_set", "gmsh:geometrical"
 
 
 def parse(data: bytes) -> Source | None:
@@ -131,7 +131,7 @@ def _labels(files: Sequence[File]) -> list[dict[str, list[Int64]]]:
     ]
     labels = {_ENTITY: [block.entities for block in blocks]}
     if any(values.any() for values in physical):
-        labels[_PHYSICAL] = physical
+        labels[PHYSICAL] = physical
     if any(len(groups) > 1 for groups in sets):
         known: dict[frozenset[int], int] = {frozenset(): 0}
         codes = [known.setdefault(frozenset(groups), len(known)) for groups in sets]
@@ -149,7 +149,7 @@ def _ids(cells: Sequence[Cells]) -> Int64:
 
 def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
     """The array of groups, if an element that is solved for is in one."""
-    name = _SETS if _SETS in labels else _PHYSICAL
+    name = _SETS if _SETS in labels else PHYSICAL
     return (name,) if name in labels and any(labels[name][i].any() for i in solved_runs(cells)) else ()
 
 
@@ -169,7 +169,26 @@ def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, 
             continue
         name = f"{name} step {step}" if name in arrays else name
         arrays[name] = values if section == "NodeData" else np.split(values, ends[:-1])
-    return Arrays(point, cell, file.names, unread=tuple(unread))
+    groups = {title: np.array([number, dimension]) for dimension, number, title in file.titles}
+    told = PHYSICAL not in labels or (_SETS not in labels and len(groups) == len(file.titles))
+    sets = {} if told else _sets(file, cells, labels)
+    return Arrays(point, cell, groups, cell_sets=sets, unread=tuple(unread))
+
+
+def _sets(file: File, cells: Sequence[Cells], labels: Mapping[str, list[Int64]]) -> dict[str, list[Int64]]:
+    """The rows of the cells of each group that has a name: an entity may be in several, and several may have one."""
+    titles: dict[tuple[int, int], list[str]] = {}
+    for dimension, number, title in file.titles:
+        titles.setdefault((dimension, number), []).append(title)
+    sets: dict[str, list[Int64]] = {}
+    for i, (block, run, physical) in enumerate(zip(file.blocks, cells, labels[PHYSICAL], strict=True)):
+        of_entity = file.groups.get(block.entity, ())  # of version 4.1
+        for number in of_entity or np.unique(physical).tolist():
+            rows = np.arange(len(physical)) if of_entity else np.flatnonzero(physical == number)
+            for title in titles.get((dimension_of(run.type), abs(number)), ()):
+                mine = sets.setdefault(title, [np.empty(0, dtype=np.int64)] * len(cells))
+                mine[i] = np.union1d(mine[i], rows)
+    return sets
 
 
 def _view(numbers: Numbers, wanted: Int64) -> tuple[str, int, NDArray[np.float64]]:

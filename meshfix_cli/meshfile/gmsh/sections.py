@@ -68,8 +68,8 @@ class File:
         Numbers of the entities that hold ghost elements.
     partitions : int
         Into how many the mesh is cut.
-    names : dict
-        Number and dimension of each group.
+    titles : list of (int, int, str)
+        Dimension, number and name of each group that has one.
     views : list
         Sections of data, by the name of the section, and what reads their numbers.
     untold : dict
@@ -85,7 +85,7 @@ class File:
     interfaces: set[tuple[int, int]] = field(default_factory=set)
     shadows: set[int] = field(default_factory=set)
     partitions: int = 0
-    names: dict[str, Any] = field(default_factory=dict)
+    titles: list[tuple[int, int, str]] = field(default_factory=list)
     views: list[tuple[str, Numbers]] = field(default_factory=list)
     untold: dict[str, None] = field(default_factory=dict)
     parametric: bool = False
@@ -126,10 +126,10 @@ def read(data: bytes) -> File:
         if name == "MeshFormat":
             numbers, readers = _format(data, begin)
         elif name == "PhysicalNames":
-            file.names |= {
-                title.decode("utf-8", "replace"): np.array([int(number), int(dimension)])
-                for dimension, number, title in _NAME.findall(data[begin:at])
-            }
+            found = _NAME.findall(data[begin:at])
+            file.titles += [
+                (int(dimension), int(number), title.decode("utf-8", "replace")) for dimension, number, title in found
+            ]
         elif name in ("NodeData", "ElementData") and numbers is not None:
             file.views.append((name, replace(numbers, at=begin)))
         at += 1

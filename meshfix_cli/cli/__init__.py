@@ -40,8 +40,8 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
 def main() -> None:
     """Repair tangled meshes of linear elements, plane or solid, by moving interior vertices.
 
-    INPUT and OUTPUT are files, or - for stdin and stdout; a .pvtu stands for its pieces, and 'mesh_*.msh', in quotes,
-    for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (OUTPUT, or a file beside it, was not written),
-    2 wrong usage, 3 inverted elements remain, the fixed boundary crosses itself or a --require is not met, 4 some of
-    several meshes cannot be read or, in a batch, are not valid.
+    INPUT and OUTPUT are files, of any format and also in .gz, or - for stdin and stdout; a .pvtu stands for its pieces,
+    and 'mesh_*.msh', in quotes, for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (OUTPUT, or a file
+    beside it, was not written), 2 wrong usage, 3 inverted elements remain, the fixed boundary crosses itself or a
+    --require is not met, 4 some of several meshes cannot be read or, in a batch, are not valid.
     """

@@ -37,7 +37,8 @@ def open_files(files: Files, held: Held, threads: int, *others: str | None) -> t
     check_others(beside, *document.files, *written)
     if files.backup:
         _check_backups(beside, written)
-    if output.binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
+    binary = output.binary or document.source.packed is not None
+    if binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
 

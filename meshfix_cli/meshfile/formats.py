@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from meshfix_cli.meshfile.compressed import inner
+
 HEAD = 4096  # bytes that are enough to recognise a format
 
 ENDLESS = ("tecplot", "wkt")  # meshio reads truncated files of these for ever
@@ -166,8 +168,8 @@ def _of_meshio(text: str) -> Format | None:
 
 
 def by_name(path: Path) -> Format | None:
-    """Recognise a format by the extension; None: unknown."""
-    suffix = path.suffix.lower()
+    """Recognise a format by the extension, that before .gz where there is one; None: unknown."""
+    suffix = inner(path).suffix.lower()
     for own in OWN.values():
         if suffix in own.extensions:
             return Format(own.extensions[suffix])

@@ -18,6 +18,7 @@ from meshfix_cli.errors import MeshfixError, ReadError, naming
 from meshfix_cli.kernels import use_threads
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile import foreign, formats
+from meshfix_cli.meshfile.compressed import inner, is_compressed, unpacked
 from meshfix_cli.meshfile.document import Document, build, with_reversed
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.pieces import join
@@ -108,18 +109,29 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
         raise ReadError("there is no such file; the files of one mesh are named with a *")
     folder = path is not None and (path.is_dir() or path.suffix.lower() == ".foam")
     data = b"" if folder else _read_bytes(path)
-    form = Format("openfoam") if folder else _format(data, Path() if path is None else path, name)
+    packed = data if is_compressed(data) else None
+    if packed is not None:
+        data = _not_empty(unpacked(packed))
+    form = Format("openfoam") if folder else _format(data, Path() if path is None else inner(path), name)
     if form is None:
         raise ReadError("the format is not recognised")
-    beside = path if path is not None and (folder or path.is_file()) else None  # a pipe can be read only once
+    # A pipe can be read only once, and nobody but this package looks into what is compressed.
+    beside = path if path is not None and (folder or path.is_file()) and packed is None else None
     if form.name == "pvtu":
+        _refuse_packed(packed)
         from meshfix_cli.meshfile.vtk.pvtu import Index
 
         return _open_pieces(Index.of(data, beside), double, threads)
     source = parse(data, form, beside)
     if double and source.points.dtype != np.float64:
         source = _promoted(data, form)
-    return source, form
+    return source if packed is None else replace(source, packed=packed), form
+
+
+def _refuse_packed(packed: bytes | None) -> None:
+    """Refuse what is compressed of a mesh in several files."""
+    if packed is not None and is_compressed(packed):
+        raise ReadError("is compressed, and a mesh in several files is read as it is; unpack it")
 
 
 def _format(data: bytes, path: Path, name: str | None) -> Format | None:
@@ -138,6 +150,7 @@ def _open_pieces(family: Family, double: bool, threads: int) -> tuple[Source, Fo
     for name, path in zip(family.names, family.paths, strict=True):
         with naming(name):
             contents.append(_read_bytes(path))
+            _refuse_packed(contents[-1])
     with _believable(family.form):
         source = join(family, family.parse(contents), threads)
         if double and source.points.dtype != np.float64:
@@ -151,12 +164,16 @@ def _read_bytes(path: Path | None) -> bytes:
     try:
         with nullcontext(sys.stdin.buffer) if path is None else path.open("rb") as stream:
             head = stream.read(formats.HEAD) if _is_device(stream) else b""
-            if _is_device(stream) and formats.sniff(head) is None:  # /dev/zero has no end
+            if _is_device(stream) and formats.sniff(head) is None and not is_compressed(head):  # /dev/zero has no end
                 raise ReadError("is a device, and no mesh comes from it" if head else "is empty")
             data = stream.read()
             data = head + data if head else data  # which would be a copy
     except OSError as error:
         raise ReadError(error.strerror or str(error)) from error
+    return _not_empty(data)
+
+
+def _not_empty(data: bytes) -> bytes:
     if not data:
         raise ReadError("is empty")
     return data
@@ -208,5 +225,6 @@ def _with_reversed(source: Source, cells: dict[int, Turned], form: Format, threa
     if source.pieces is not None:
         return source.pieces.turned(source.points, cells, threads)
     if source.layout is not None:
-        return parse(source.layout.rewritten(source.points, source.points, cells), form)
+        turned = parse(source.layout.rewritten(source.points, source.points, cells), form)
+        return replace(turned, packed=source.packed)
     return with_reversed(source, cells)

@@ -185,6 +185,8 @@ class Source:
         The parts of the mesh have coordinates of their own, in which they may lie over one another.
     pieces : Pieces or None
         What stands for the layout where the mesh lies in several files. With neither it can only be written anew.
+    packed : bytes or None
+        The file as it is, where gzip has compressed it.
     """
 
     points: Points
@@ -200,6 +202,7 @@ class Source:
     oriented: bool = True
     apart: bool = False
     pieces: Pieces | None = None
+    packed: bytes | None = field(default=None, repr=False)
 
     @property
     def spliced(self) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.mesh.elements import words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile import foreign, formats
+from meshfix_cli.meshfile import compressed, foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import PARTS, Format
@@ -66,14 +66,20 @@ def write(
     target = os.fspath(target)
     form = form or output_format(document, target)
     check_output(document, target, form)
-    points, source, put = document.file_points(mesh), document.source, None if is_stream(target) else put
+    packed = is_packed(document, target)
+    points, source, put = document.file_points(mesh), document.source, None if packed or is_stream(target) else put
     stored = document.in_plane(points.astype(np.float64), mesh)
     layout, pieces = (source.layout, source.pieces) if form == document.format else (None, None)
     if pieces is not None:
         write_files(pieces.files(target, source.points, points), backup)
         return stored, ()
+    same = form == document.format and points.tobytes() == source.points.tobytes()
+
+    def write_one(produce: Callable[[Path], object]) -> None:
+        write_file(target, partial(_pack, produce, source.packed if same else None) if packed else produce, backup)
+
     if layout is not None:
-        write_file(target, partial(_splice, layout, source.points, points, put), backup)
+        write_one(partial(_splice, layout, source.points, points, put))
         return stored, ()
     dropped: tuple[str, ...] = ()
     unmoved = source.data if document.is_as_read(mesh, form) else None
@@ -91,8 +97,25 @@ def write(
             dropped = (*dropped, *foreign.words_lost(source.data, temporary.read_bytes()))
         stored = document.in_plane(held, mesh)
 
-    write_file(target, produce, backup)
+    write_one(produce)
     return stored, dropped
+
+
+def is_packed(document: Document, target: str) -> bool:
+    """Whether an output is compressed: by its name or, in the place of the input and on stdout, as the input is."""
+    if target == "-" or document.is_file(target):
+        return document.source.packed is not None
+    return compressed.has_suffix(Path(target))
+
+
+def _pack(produce: Callable[[Path], object], original: bytes | None, path: Path) -> None:
+    """Compress what is produced; the original, where that holds the same, stays as it was compressed."""
+    plain = path.with_name(f"unpacked_{compressed.inner(path).name}")
+    produce(plain)
+    if original is not None and compressed.unpacked(original) == plain.read_bytes():
+        path.write_bytes(original)
+    else:
+        compressed.pack(plain, path)
 
 
 def _splice(layout: Layout, original: Points, points: Points, put: Put | None, path: Path) -> None:
@@ -161,6 +184,8 @@ def check_output(document: Document, target: str, form: Format) -> None:
     """Raise WriteError now, before any work, where an output cannot be or would replace a piece of the input."""
     pieces = document.source.pieces
     if pieces is not None and form == document.format:
+        if is_packed(document, target):
+            raise WriteError(f"{target}: a mesh in several files is not compressed; name an OUTPUT without .gz")
         targets = pieces.targets(target)
         if not (Path(target).is_dir() and all(Path(one).is_relative_to(target) for one in targets)):
             check_target(target)
@@ -210,8 +235,8 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
 
 def unknown_extension(document: Document, target: str) -> str | None:
     """Return the extension of a target, as written, if it names no format and is not that of the input."""
-    extension = Path(target).suffix
-    if not extension or extension == Path(document.name).suffix or formats.by_name(Path(target)) is not None:
+    extension, mine = (compressed.inner(Path(name)).suffix for name in (target, document.name))
+    if not extension or extension == mine or formats.by_name(Path(target)) is not None:
         return None
     return extension
 
@@ -219,7 +244,8 @@ def unknown_extension(document: Document, target: str) -> str | None:
 def _writable(form: Format, target: str) -> Format:
     if form.name == "gmsh":  # meshio leaves out entities that own no node, and gmsh does not open that
         raise WriteError(f"{target}: files of gmsh 4.1 are written back, but not made of others; use --format gmsh22")
-    if form.name == "ugrid" and not re.search(r"\.l?[br](?:4|8)l?\.ugrid$", target):  # meshio writes numpy's repr
+    name = compressed.inner(Path(target)).name
+    if form.name == "ugrid" and not re.search(r"\.l?[br](?:4|8)l?\.ugrid$", name):  # meshio writes numpy's repr
         raise WriteError(f"{target}: text files of UGRID cannot be written; name a .b8.ugrid")
     if form.name not in formats.writers():
         raise WriteError(f"{target}: the format {form.name} cannot be written")

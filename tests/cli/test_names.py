@@ -195,8 +195,8 @@ def test_an_unknown_extension_of_the_output_is_told(tmp_path: Path) -> None:
     odd = tmp_path / "a.xyz"
     told = "the extension .xyz is not known, so it is written as vtk"
     assert notes("untangle", TANGLED, odd) == [f"{odd}: {told}"]
-    assert notes("perturb", "--percent", 9, "--dist", "h", odd, tmp_path / "b.msh.gz") == [
-        f"{tmp_path / 'b.msh.gz'}: the extension .gz is not known, so it is written as vtk"
+    assert notes("perturb", "--percent", 9, "--dist", "h", odd, tmp_path / "b.abc.gz") == [
+        f"{tmp_path / 'b.abc.gz'}: the extension .abc is not known, so it is written as vtk"
     ]
     for target in (odd, tmp_path / "c.xyz", tmp_path / "c.vtu", tmp_path / "c"):
         assert notes("untangle", odd, target) == []

@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs figures man samples clean
+.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs formats figures man samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -90,6 +90,9 @@ figures: $(VENV)/developer ## make the pictures of the README again
 	$(BIN)/meshfix untangle --quiet --dry-run --plot docs/pictures/plate.svg sample_meshes/plate_tangled.vtk
 	$(BIN)/meshfix untangle --quiet --dry-run --report out/report.html sample_meshes/bracket_tangled.vtk
 	$(CHROMIUM) --window-size=1000,1130 --virtual-time-budget=4000 --screenshot=docs/pictures/report.png out/report.html
+
+formats: $(VENV)/installed ## make the table of formats in docs/files.md, and the list in the README
+	$(BIN)/python docs/make_formats.py
 
 RELEASED := 2026-11-26
 man: $(VENV)/developer ## make the manual pages in man/ of the help

@@ -44,6 +44,14 @@ class Own:
         (all bytes, the first of them as text without blanks in front) -> Format, or None where it is not this.
     extensions : dict
         The name of the `Format` that a file with this extension becomes.
+    title : str
+        What it is called; this and what follows is the row of the table in docs/files.md.
+    reads : str
+        Its variants, and what is not read.
+    groups : str
+        What its regions and groups are.
+    extra : str
+        What is to be installed to read it, and when.
     beside : bool
         A file may need others beside it: `parse` gets its path as well, or None.
     """
@@ -51,6 +59,10 @@ class Own:
     module: str
     recognise: Callable[[bytes, str], Format | None]
     extensions: Mapping[str, str]
+    title: str = ""
+    reads: str = ""
+    groups: str = ""
+    extra: str = ""
     beside: bool = False
 
 
@@ -128,20 +140,55 @@ def _is_xml(text: str) -> bool:
 
 # By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
 # in which each element has its group: meshio's writer of 4.1 has one for each run of them.
+_VTK_GROUPS = "cell data that are called like a material"
 OWN = {
-    "stl": Own("stl", _stl, {".stl": "stl"}),
-    "vtk": Own("vtk.legacy", _vtk, {".vtk": "vtk"}),
-    "gmsh": Own("gmsh", _gmsh, {".msh": "gmsh22"}),
-    "pvtu": Own("vtk.pvtu", _pvtu, {".pvtu": "pvtu"}),
-    "vtu": Own("vtk.vtu", _vtu, {".vtu": "vtu"}),
-    "ply": Own("ply", _ply, {".ply": "ply"}),
-    "medit": Own("medit", _medit, {".mesh": "medit"}),
-    "abaqus": Own("abaqus", _abaqus, {".inp": "abaqus"}, beside=True),
-    "obj": Own("obj", _obj, {".obj": "obj"}),
-    "openfoam": Own("openfoam", _openfoam, {".foam": "openfoam"}, beside=True),
-    "tetgen": Own("tetgen", _by_extension, {".node": "tetgen", ".ele": "tetgen"}, beside=True),
-    "su2": Own("su2", _su2, {".su2": "su2"}),
-}
+    "stl": Own(
+        "stl", _stl, {".stl": "stl"}, "STL",
+        "text and binary; normals of the facets that moved are computed again", "solids",
+    ),
+    "vtk": Own(
+        "vtk.legacy", _vtk, {".vtk": "vtk"}, "VTK",
+        "1.0 to 5.1, text and binary, unstructured grids and polygons", _VTK_GROUPS,
+    ),
+    "gmsh": Own(
+        "gmsh", _gmsh, {".msh": "gmsh22"}, "gmsh",
+        "2 and 4.1, text and binary, in one file or several; parameters (u, v) of nodes stay as they are",
+        "physical groups",
+    ),
+    "pvtu": Own("vtk.pvtu", _pvtu, {".pvtu": "pvtu"}, "VTK", "with its pieces, which are `.vtu`", _VTK_GROUPS),
+    "vtu": Own(
+        "vtk.vtu", _vtu, {".vtu": "vtu"}, "VTK",
+        "text, base64, appended; uncompressed, zlib, lz4, lzma", _VTK_GROUPS, "`lz4`, where numbers are compressed so",
+    ),
+    "ply": Own(
+        "ply", _ply, {".ply": "ply"}, "PLY",
+        "text and binary; normals of the facets that moved are computed again", "none",
+    ),
+    "medit": Own(
+        "medit", _medit, {".mesh": "medit"}, "MEDIT",
+        "text; required vertices and edges, and corners, are held", "references",
+    ),
+    "abaqus": Own(
+        "abaqus", _abaqus, {".inp": "abaqus"}, "Abaqus",
+        "parts, instances, sets, sections; files that it includes; no mesh that comes from `*NGEN` and the like",
+        "sections or, in a file without any, the sets of its elements; sets of nodes and of elements", beside=True,
+    ),
+    "obj": Own(
+        "obj", _obj, {".obj": "obj"}, "Wavefront",
+        "all dialects; a file that was cut between two lines is a smaller mesh, nothing tells it", "materials",
+    ),
+    "openfoam": Own(
+        "openfoam", _openfoam, {".foam": "openfoam"}, "OpenFOAM",
+        "a folder `polyMesh`, or a case or a `.foam` that stands for it; text and binary; other polyhedra are held",
+        "zones of cells; patches, zones of faces and of points", beside=True,
+    ),
+    "tetgen": Own(
+        "tetgen", _by_extension, {".node": "tetgen", ".ele": "tetgen"}, "TetGen, Triangle",
+        "both files, and faces and edges beside them that have a marker; all files of the mesh are written",
+        "attributes of elements; markers of faces", beside=True,
+    ),
+    "su2": Own("su2", _su2, {".su2": "su2"}, "SU2", "zones, markers, boxes of deformation", "zones; markers"),
+}  # fmt: skip
 
 
 def sniff(data: bytes) -> Format | None:
@@ -200,4 +247,4 @@ def readers() -> tuple[str, ...]:
     """Names of the formats that can be read."""
     import meshio
 
-    return tuple(sorted(set(meshio._helpers.reader_map) - set(ENDLESS)))
+    return tuple(sorted({*OWN, *meshio._helpers.reader_map} - set(ENDLESS)))

@@ -6,13 +6,14 @@ import importlib
 import re
 from dataclasses import fields
 
+import make_formats
 import pytest
 from places import ROOT
 from splicing import FORMATS
 
 from meshfix_cli.cli.untangle import untangle as command
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.formats import OWN
+from meshfix_cli.meshfile.formats import OWN, readers
 from meshfix_cli.quality import corners, simplices
 from meshfix_cli.quality.metrics import METRICS, NUMBERS
 from meshfix_cli.quality.requirement import Requirement
@@ -35,12 +36,21 @@ def test_formats(name: str) -> None:
     told = module.__doc__ or ""
     assert len(told.splitlines()) >= 3, "the docstring tells how the coordinates lie"
     assert "Source:" in told, "the docstring names what describes the format"
-    table = "".join(re.findall(r"^\|.*\n", (DOCS / "files.md").read_text(), re.MULTILINE))
-    assert all(f"`{extension}`" in table for extension in OWN[name].extensions), "the table in docs/files.md"
+    assert all((OWN[name].title, OWN[name].reads, OWN[name].groups)), "what docs/files.md says of it"
     assert all(f"`{extension}`" in README for extension in OWN[name].extensions), "README.md"
     assert (TESTS / f"meshfile/test_{name}.py").exists()
     assert hasattr(importlib.import_module(f"files_{name}"), "read_independently")
     assert name in FORMATS or name in ("pvtu", "openfoam", "tetgen")  # several files, with tables of their own
+
+
+def test_pages_tell_of_the_formats_that_there_are() -> None:
+    for page, text in make_formats.pages().items():
+        assert page.read_text() == text, "make formats makes it again"
+        assert make_formats.BEGIN in text
+    names = [row[0] for row in make_formats.rows()]
+    assert len(names) == len(set(names)) == len(readers())
+    assert all(len(row) == len(make_formats.HEAD) for row in make_formats.rows())
+    assert all(title.count("`") for title in names[: len(OWN)])
 
 
 def test_strategies() -> None:

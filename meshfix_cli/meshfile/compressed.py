@@ -70,12 +70,9 @@ def unpacked(data: bytes) -> bytes:
     return content
 
 
-def pack(plain: Path, target: Path) -> None:
-    """Compress a file into another: the same bytes for the same content, with no name and no time in them."""
+def packed(data: bytes) -> bytes:
+    """Compress a file: the same bytes for the same content, with no name and no time in them."""
     import zlib
 
     packer = zlib.compressobj(LEVEL, wbits=31)
-    with plain.open("rb") as source, target.open("wb") as out:
-        while chunk := source.read(64 * CHUNK):
-            out.write(packer.compress(chunk))
-        out.write(packer.flush())
+    return packer.compress(data) + packer.flush()

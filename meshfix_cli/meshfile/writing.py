@@ -112,10 +112,9 @@ def _pack(produce: Callable[[Path], object], original: bytes | None, path: Path)
     """Compress what is produced; the original, where that holds the same, stays as it was compressed."""
     plain = path.with_name(f"unpacked_{compressed.inner(path).name}")
     produce(plain)
-    if original is not None and compressed.unpacked(original) == plain.read_bytes():
-        path.write_bytes(original)
-    else:
-        compressed.pack(plain, path)
+    data = plain.read_bytes()
+    kept = original is not None and compressed.unpacked(original) == data
+    path.write_bytes(original if original is not None and kept else compressed.packed(data))
 
 
 def _splice(layout: Layout, original: Points, points: Points, put: Put | None, path: Path) -> None:

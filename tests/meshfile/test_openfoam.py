@@ -24,6 +24,8 @@ FORMS = {
     "text": {},
     "binary": {"binary": True},
     "single": {"binary": True, "scalar": 32},
+    "packed": {"packed": True},
+    "packed binary": {"binary": True, "packed": True},
 }
 forms = pytest.mark.parametrize("form", FORMS)
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from meshfix_cli.errors import ReadError, naming
+from meshfix_cli.meshfile.compressed import is_compressed, packed, unpacked
 from meshfix_cli.meshfile.faces import Faces
 from meshfix_cli.meshfile.openfoam.lists import File
 from meshfix_cli.meshfile.source import Cells, Source
@@ -55,10 +56,12 @@ def parse(_: bytes, path: Path | None) -> Source:
         return [*(there / one.relative_to(folder) for one in (points, *copied)), *([target] if marked else [])]
 
     def read(contents: Sequence[bytes]) -> Source:
-        source, layout = _source(File.of(contents[0]), folder)
+        data = unpacked(contents[0]) if is_compressed(contents[0]) else contents[0]
+        source, layout = _source(data, folder)
 
         def written(original: Points, moved: Points, turned: Mapping[int, Turned]) -> list[bytes]:
-            return [layout.rewritten(original, moved, turned)]
+            new = layout.rewritten(original, moved, turned)
+            return [contents[0] if new == data else packed(new) if is_compressed(contents[0]) else new]
 
         return replace(source, pieces=Together(path, [points], layout, written, read, [*copied, *marked], places))
 
@@ -66,7 +69,12 @@ def parse(_: bytes, path: Path | None) -> Source:
 
 
 def _file(folder: Path, name: str) -> Path | None:
-    return folder / name if (folder / name).is_file() else None
+    return next((one for one in (folder / name, folder / f"{name}.gz") if one.is_file()), None)
+
+
+def _bytes(path: Path) -> bytes:
+    data = path.read_bytes()
+    return unpacked(data) if is_compressed(data) else data
 
 
 def _read(folder: Path, name: str) -> File | None:
@@ -74,12 +82,13 @@ def _read(folder: Path, name: str) -> File | None:
     if path is None:
         return None
     with naming(name):
-        return File.of(path.read_bytes())
+        return File.of(_bytes(path))
 
 
-def _source(points: File, folder: Path) -> tuple[Source, InPlace]:
+def _source(data: bytes, folder: Path) -> tuple[Source, InPlace]:
     """Join the coordinates with what the other files of a folder tell about them."""
     with naming("points"):
+        points = File.of(data)
         coordinates = points.vectors()
     faces, runs = _faces(folder, len(coordinates.begin)), Runs()
     zones = list(_zones(folder, "cellZones"))

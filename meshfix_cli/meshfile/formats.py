@@ -134,8 +134,18 @@ def _by_extension(_: bytes, __: str) -> Format | None:
     return None
 
 
+def _in_hdf5(name: bytes, form: str) -> Callable[[bytes, str], Format | None]:
+    """Return what recognises a file of HDF5 by the name of a group that only this format has."""
+
+    def recognise(data: bytes, _: str) -> Format | None:
+        begins = any(data.startswith(b"\x89HDF\r\n\x1a\n", at) for at in (0, 512, 1024, 2048))
+        return Format(form) if begins and name in data else None
+
+    return recognise
+
+
 def _is_xml(text: str) -> bool:
-    return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<dolfin"))
+    return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
 
 # By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
@@ -186,6 +196,11 @@ OWN = {
         "tetgen", _by_extension, {".node": "tetgen", ".ele": "tetgen"}, "TetGen, Triangle",
         "both files, and faces and edges beside them that have a marker; all files of the mesh are written",
         "attributes of elements; markers of faces", beside=True,
+    ),
+    "med": Own(
+        "med", _in_hdf5(b"ENS_MAA", "med"), {".med": "med", ".mmed": "med", ".rmed": "med"}, "MED",
+        "versions 2 to 4, of one mesh at one step, also compressed; fields of one step are data", "families; groups",
+        "`h5py`",
     ),
     "su2": Own("su2", _su2, {".su2": "su2"}, "SU2", "zones, markers, boxes of deformation", "zones; markers"),
 }  # fmt: skip

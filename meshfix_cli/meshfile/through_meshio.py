@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES
-from meshfix_cli.meshfile import foreign, formats
+from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.solved import solved_runs
@@ -132,7 +132,9 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
 
 
 def _in_order_of(form: Format, run: Cells) -> Any:
-    """Return the vertices of cells so that meshio, which still turns wedges for VTK, writes them as they are."""
+    """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, not for MED."""
+    if form.reader == "med" and run.type in med.ORDER:
+        return run.vertices[:, np.argsort(med.ORDER[run.type])]
     return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices
 
 

@@ -92,7 +92,6 @@ _ONCE = {
     "off": [("meshes", rb"(?m)^\s*(?:ST)?C?N?4?n?OFF\b")],
     "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],
     "su2": [("zones", rb"(?m)^\s*(?:NZONE\s*=\s*(?:[2-9]|1\d)|IZONE\s*=)"), ("zones", rb"(?m)^\s*NPOIN\s*=")],
-    "xdmf": [("grids", rb"<Grid\b"), ("domains", rb"<Domain\b")],
 }
 
 

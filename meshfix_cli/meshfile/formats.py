@@ -144,6 +144,10 @@ def _in_hdf5(name: bytes, form: str) -> Callable[[bytes, str], Format | None]:
     return recognise
 
 
+def _xdmf(_: bytes, text: str) -> Format | None:
+    return Format("xdmf") if _is_xml(text) and "<Xdmf" in text else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -197,6 +201,12 @@ OWN = {
         "both files, and faces and edges beside them that have a marker; all files of the mesh are written",
         "attributes of elements; markers of faces", beside=True,
     ),
+    "xdmf": Own(
+        "xdmf", _xdmf, {".xdmf": "xdmf", ".xmf": "xdmf"}, "XDMF",
+        "numbers as text, in raw files or in HDF5 beside it; mesh tags of FEniCS, and steps in time of one mesh",
+        "mesh tags of cells, and cell data that are called like a material; sets", "`h5py`, where numbers are in HDF5",
+        beside=True,
+    ),
     "med": Own(
         "med", _in_hdf5(b"ENS_MAA", "med"), {".med": "med", ".mmed": "med", ".rmed": "med"}, "MED",
         "versions 2 to 4, of one mesh at one step, also compressed; fields of one step are data", "families; groups",
@@ -221,7 +231,7 @@ _UCD = re.compile(rf"(?:#[^\n]*\n\s*)*(?:\d+[ \t]+){{4}}\d+\s*\n\s*\d+(?:\s+{_NU
 def _of_meshio(text: str) -> Format | None:
     """Recognise what only meshio reads."""
     if _is_xml(text):
-        return Format("xdmf") if "<Xdmf" in text else Format("dolfin-xml") if "<dolfin" in text else None
+        return Format("dolfin-xml") if "<dolfin" in text else None
     if text.startswith("* FLAC3D"):
         return Format("flac3d")
     if _UCD.match(text):

@@ -124,7 +124,7 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
         return _open_pieces(Index.of(data, beside), double, threads)
     source = parse(data, form, beside)
     if double and source.points.dtype != np.float64:
-        source = _promoted(data, form)
+        source = _promoted(data, form, beside)
     return source if packed is None else replace(source, packed=packed), form
 
 
@@ -214,11 +214,11 @@ def _module(form: Format) -> Any:
     return import_module(f"meshfix_cli.meshfile.{formats.OWN[form.reader].module}")
 
 
-def _promoted(data: bytes, form: Format) -> Source:
+def _promoted(data: bytes, form: Format, beside: Path | None) -> Source:
     """Return what the file holds with its coordinates in float64."""
     if form.reader not in formats.OWN or not hasattr(_module(form), "promoted"):
         raise ReadError(f"coordinates of {form.name} files cannot be double")
-    return parse(_module(form).promoted(data), form)
+    return parse(_module(form).promoted(data), form, beside)
 
 
 def _with_reversed(source: Source, cells: dict[int, Turned], form: Format, threads: int) -> Source:

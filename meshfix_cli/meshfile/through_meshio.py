@@ -19,7 +19,7 @@ from meshio.mdpa._mdpa import _mdpa_to_meshio_type
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
-from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plainly import plainly
@@ -178,7 +178,7 @@ def _source(mesh: Any, data: bytes, form: Format) -> Source:
         load=lambda: arrays,
         regions=regions_among(cell),
         data=data,
-        oriented=not _arbitrary(form, cells),
+        oriented=form.name != "dolfin-xml",  # whose cells have ascending vertices,
     )
 
 
@@ -196,13 +196,6 @@ def _numbered(cells: list[Cells], numbers: dict[str, NDArray[np.int64]]) -> list
         known = len(mine) == counts[run.type]
         numbered.append(replace(run, ids=mine[begin : used[run.type]]) if known else run)
     return numbered
-
-
-def _arbitrary(form: Format, cells: list[Cells]) -> bool:
-    """Whether cells are numbered with no regard to their orientation: dolfin's are, with ascending vertices."""
-    simplices = [run.vertices for run in cells if run.type in (one.key for one in SIMPLICES.values())]
-    ascending = len(simplices) > 0 and all((np.diff(vertices, axis=1) > 0).all() for vertices in simplices)
-    return form.name == "dolfin-xml" or (form.name == "xdmf" and ascending)
 
 
 @contextlib.contextmanager

@@ -56,7 +56,6 @@ def test_ucd_is_read_under_the_name_of_abaqus(tmp_path: Path) -> None:
     ("name", "text", "words"),
     [
         ("a.su2", "NZONE= 2\nIZONE= 1\nNDIME= 2\nNELEM= 0\n", "several zones"),
-        ("a.xdmf", '<Xdmf><Domain><Grid Name="a"/><Grid Name="b"/></Domain></Xdmf>', "several grids"),
         ("a.mdpa", "Begin Nodes\nEnd Nodes\nBegin Elements Element9D9N\nEnd Elements\n", "called Element9D9N"),
     ],
 )  # fmt: skip

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from files_pvtu import slabs, split
+from files_xdmf import stored
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapes import plate
@@ -149,3 +150,33 @@ def test_broken_pieces(files: dict[str, bytes]) -> None:
             assert {path.name for path in Path(folder).iterdir()} == files.keys()
             return
         assert read(Path(folder) / "out.pvtu").mesh.check() == result.check()
+
+
+@cache
+def files_of_fenics() -> dict[str, bytes]:
+    with tempfile.TemporaryDirectory() as folder:
+        stored(Path(folder))
+        return {path.name: path.read_bytes() for path in Path(folder).iterdir()}
+
+
+@st.composite
+def broken_files_of_fenics(draw: st.DrawFn) -> dict[str, bytes]:
+    files = files_of_fenics()
+    name = draw(st.sampled_from(sorted(files)))
+    return {**files, name: mutated(draw, files[name])}
+
+
+@settings(max_examples=EXAMPLES or 60, derandomize=not EXAMPLES, deadline=None, database=None)
+@given(broken_files_of_fenics())
+def test_broken_files_of_fenics(files: dict[str, bytes]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        for name, data in files.items():
+            (Path(folder) / name).write_bytes(data)
+        try:
+            document = read(Path(folder) / "in.xdmf")
+            result, _ = write(document, untangle(document.mesh, sweeps=2, smooth=1).after, Path(folder) / "out.xdmf")
+        except MeshfixError as error:
+            assert "\n" not in str(error)
+            assert {path.name for path in Path(folder).iterdir()} == files.keys()
+            return
+        assert read(Path(folder) / "out.xdmf").mesh.check() == result.check()

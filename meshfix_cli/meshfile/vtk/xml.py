@@ -117,7 +117,7 @@ class XmlFile:
         found = _APPENDED.finditer(data) if b"<AppendedData" in data else ()
         tag = next((match for match in found if match[1]), None)
         if tag is None:
-            file = cls(data, *_elements(data, len(data), len(data)), 0, 0)
+            file = cls(data, *elements(data, len(data), len(data)), 0, 0)
             if file.arrays:
                 raise ReadError("is not a readable vtu file: it has no appended data")
             return file
@@ -127,10 +127,10 @@ class XmlFile:
         start = _UNDERSCORE.match(data, tag.end(), end)
         if start is None:
             raise ReadError("is not a readable vtu file: its appended data do not begin with an underscore")
-        elements = _elements(data, tag.end(), end)
-        if [element.at for element in elements[0].named("AppendedData")] != [tag.start()]:
+        parsed = elements(data, tag.end(), end)
+        if [element.at for element in parsed[0].named("AppendedData")] != [tag.start()]:
             raise ReadError("is not a readable vtu file: its appended data are not where they should be")
-        file = cls(data, *elements, start.end(), end)
+        file = cls(data, *parsed, start.end(), end)
         if file._offsets and file._offsets[-1] > end - file.begin:
             raise ReadError("is truncated: its appended data end before its last array begins")
         return file
@@ -205,10 +205,26 @@ class XmlFile:
         return apply(self.data, [*edits, *shifts])
 
 
-def _elements(data: bytes, head: int, tail: int) -> tuple[Element, list[Element], bool]:
+def elements(
+    data: bytes, head: int, tail: int, form: str = "vtu", root: str = "VTKFile", doctype: bool = False
+) -> tuple[Element, list[Element], bool]:
     """Read the elements before `head` and from `tail`: the root, those with appended arrays, and if there are comments.
 
     Between the two may be anything, also what is not XML.
+
+    Parameters
+    ----------
+    form : str
+        What the file is called in sentences.
+    root : str
+        The tag with which it ends.
+    doctype : bool
+        Whether a document type may be declared; nothing that stands for something else may be.
+
+    Raises
+    ------
+    ReadError
+        They are not well-formed.
     """
     parser = expat.ParserCreate()
     stack = [Element("", {}, 0, 0)]
@@ -223,7 +239,7 @@ def _elements(data: bytes, head: int, tail: int) -> tuple[Element, list[Element]
         at = position()
         match = _TAG.match(data, at)
         if match is None or not data.startswith(b"<" + tag.encode(), at):  # UTF-16, for one
-            raise ReadError("is not a readable vtu file: its tags are not where they should be")
+            raise ReadError(f"is not a readable {form} file: its tags are not where they should be")
         if stack[-1].end < 0:
             stack[-1].end = at
         element = Element(tag, attributes, at, match.end())
@@ -238,18 +254,22 @@ def _elements(data: bytes, head: int, tail: int) -> tuple[Element, list[Element]
             element.end = max(position(), element.begin)
 
     def refuse(*_: object) -> None:
-        raise ReadError("is not a readable vtu file: it has a document type declaration")
+        raise ReadError(f"is not a readable {form} file: it has a document type declaration")
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
-    parser.CommentHandler, parser.StartDoctypeDeclHandler = comments.append, refuse
+    parser.CommentHandler = comments.append
+    if doctype:
+        parser.EntityDeclHandler = refuse
+    else:
+        parser.StartDoctypeDeclHandler = refuse
     view = memoryview(data)
     try:
         parser.Parse(view[:head], False)
         parser.Parse(view[tail:], True)
     except expat.ExpatError as error:
-        if b"</VTKFile" not in data[-4096:]:
-            raise ReadError("is truncated: it does not end with </VTKFile>") from error
-        raise ReadError(f"is not a readable vtu file: {error}") from error
+        if f"</{root}".encode() not in data[-4096:]:
+            raise ReadError(f"is truncated: it does not end with </{root}>") from error
+        raise ReadError(f"is not a readable {form} file: {error}") from error
     except (LookupError, ValueError) as error:
-        raise ReadError(f"is not a readable vtu file: its encoding is not known ({error})") from error
+        raise ReadError(f"is not a readable {form} file: its encoding is not known ({error})") from error
     return stack[0].children[0], arrays, bool(comments)

@@ -76,7 +76,11 @@ def _coordinates(data: bytes, at: NDArray[np.int64]) -> Spans:
     spans = line_words(data, at, 3)
     if not len(spans):
         raise ReadError("is not a readable obj file: it has no vertices")
-    short = spans[:, 2, 0] < 0
+    raw = np.frombuffer(data, dtype=np.uint8)
+    short = (spans[..., 0] < 0) | (raw[spans[..., 0]] == ord("#"))
+    if short[:, 2].all() and not short[:, :2].any():  # as some programs write meshes in the plane
+        return spans[:, :2]
+    short = short.any(axis=1)
     if short.any():
         raise in_line(data, int(at[short.argmax()]), "a vertex of less than three coordinates")
     return spans
@@ -108,7 +112,7 @@ def _vertices(data: bytes, spans: Spans, before: NDArray[np.int64], n: int) -> N
 
 def _untold(data: bytes, coordinates: Places, keywords: set[Any]) -> tuple[str, ...]:
     assert coordinates.end is not None
-    fourth = line_words(data, coordinates.end[:, 2], 1)[:, 0, 0]
+    fourth = line_words(data, coordinates.end[:, -1], 1)[:, 0, 0]
     found = [what for what, names in _UNTOLD.items() if names & keywords]
     if b"#" in data:
         found.insert(0, "comments")

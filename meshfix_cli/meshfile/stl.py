@@ -20,6 +20,7 @@ from meshfix_cli.meshfile.splice import Edits, Places, Points, Turned, apply, di
 from meshfix_cli.meshfile.text import Spans, first_words, in_line, line_words
 
 _SOLID = re.compile(rb"(?:\xef\xbb\xbf)?\s*solid\b", re.IGNORECASE)
+_END = re.compile(rb"(?m)^([ \t]*)end solid")  # as long as the word that is meant
 _FACET = np.array([b"facet", b"vertex", b"vertex", b"vertex", b"endfacet"])
 _HEAD = 84  # bytes of a binary file before its facets
 _BINARY = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -34,17 +35,20 @@ class _Facets:
     ----------
     data : bytes
     normals : Places
-        A row for each facet.
+        A row for each facet that has one.
     corners : Places
         Three rows for each facet.
     rows : (m, 3) int64
         Rows of the points.
+    bare : (m,) bool
+        The facets that have no normal.
     """
 
     data: bytes
     normals: Places
     corners: Places
     rows: NDArray[np.int64]
+    bare: NDArray[np.bool_]
 
     def rounded(self, points: Points) -> Points:
         """Return points (n, 3) as the file can hold them."""
@@ -68,9 +72,9 @@ class _Facets:
         return self.corners.at(here).copied(self.data, self.corners.at(there))
 
     def _renewed(self, facets: NDArray[np.bool_], corners: Points) -> Edits:
-        """Make the normals of some facets those of their corners (k, 3, 3)."""
-        places = self.normals.at(facets)
-        values = _normals(corners)
+        """Make the normals of some facets, where they have one, those of their corners (k, 3, 3)."""
+        places = self.normals.at(facets[~self.bare])
+        values = _normals(corners[~self.bare[facets]])
         try:
             with np.errstate(invalid="ignore"):
                 wrong = ~(np.abs(places.read(self.data) - values) <= _RIGHT)
@@ -98,18 +102,20 @@ def _parse_binary(data: bytes, facets: int) -> Source:
     begin = _HEAD + _BINARY.itemsize * np.arange(facets, dtype=np.int64)
     corners = Places.of_rows((begin[:, None] + np.array([12, 24, 36])).ravel(), 3, "<f4")
     cell = {"attribute": [table["attribute"].astype(np.uint16)]} if table["attribute"].any() else {}
-    source = _source(data, Places.of_rows(begin, 3, "<f4"), corners, table["corners"].reshape(-1, 3).astype("=f4"))
+    coordinates = table["corners"].reshape(-1, 3).astype("=f4")
+    source = _source(data, Places.of_rows(begin, 3, "<f4"), corners, coordinates, np.zeros(facets, dtype=bool))
     return replace(source, load=lambda: Arrays(cell=cell), untold=("header",) if data[:80].strip(b"\0 ") else ())
 
 
 def _parse_text(data: bytes) -> Source:
-    ends, words = first_words(data.lower())
+    ends, words = first_words(_END.sub(rb"\1endsolid ", data.lower()))
     _check_keywords(data, ends, words)
     corners = Places.of_text(_numbers(data, ends[words == b"vertex"], 3, "a vertex has not three coordinates"))
     begin = ends[words == b"facet"]
-    normals = Places.of_text(_numbers(data, begin, 4, "a facet has not one normal")[:, 1:])
+    bare = line_words(data, begin, 1)[:, 0, 0] < 0
+    normals = Places.of_text(_numbers(data, begin[~bare], 4, "a facet has not one normal")[:, 1:])
     solids = ends[words == b"solid"]
-    source = _source(data, normals, corners, corners.read(data))
+    source = _source(data, normals, corners, corners.read(data), bare)
     named = (line_words(data, solids, 1) >= 0).any()
     cell = {"stl:solid": [np.searchsorted(solids, begin) - 1]} if len(solids) > 1 else {}
     load = lambda: Arrays(cell=cell)  # noqa: E731
@@ -138,10 +144,10 @@ def _numbers(data: bytes, at: NDArray[np.int64], count: int, what: str) -> Spans
     return spans[:, :count]
 
 
-def _source(data: bytes, normals: Places, corners: Places, coordinates: Points) -> Source:
+def _source(data: bytes, normals: Places, corners: Places, coordinates: Points, bare: NDArray[np.bool_]) -> Source:
     first, rows = _merged(coordinates)
     facets = rows.reshape(-1, 3)
-    return Source(coordinates[first], [Cells("triangle", facets)], _Facets(data, normals, corners, facets))
+    return Source(coordinates[first], [Cells("triangle", facets)], _Facets(data, normals, corners, facets, bare))
 
 
 def _merged(coordinates: Points) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

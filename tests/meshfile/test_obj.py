@@ -9,7 +9,7 @@ import files_obj
 import numpy as np
 import pytest
 
-from meshfix_cli import read
+from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import obj
 from meshfix_cli.meshfile.solved import turned
@@ -118,7 +118,7 @@ def test_reversed_faces_take_textures_and_normals_with_them() -> None:
         (b"f 1 2.5 3\n", "line 5: '2.5' is not an integer"),
         (b"v 1 2\n", "line 5: a vertex of less than three coordinates"),
         (b"v", "line 5: a vertex of less than three coordinates"),
-        (b"v 1 2 # 3\n", "line 5: '#' is not a number"),
+        (b"v 1 2 # 3\n", "line 5: a vertex of less than three coordinates"),
         (b"v 1 2 three\n", "line 5: 'three' is not a number"),
         (b"v 0,5 1,5 0,0\n", "line 5: there is a comma between the numbers"),
     ],
@@ -181,3 +181,15 @@ def test_what_no_other_format_would_hold_is_named() -> None:
         "comments", "objects and groups", "materials", "smoothing groups", "texture coordinates", "normals",
         "colours or weights of vertices",
     )  # fmt: skip
+
+
+def test_vertices_of_a_plane_mesh_may_have_two_coordinates(tmp_path: Path) -> None:
+    data = b"v 0 0\nv 1 0 # 2\nv 1 1\nv 0 1\nv 1.5 0.5\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n"
+    source = parse(data)
+    assert source.points.tolist() == [[0, 0], [1, 0], [1, 1], [0, 1], [1.5, 0.5]]
+    (tmp_path / "in.obj").write_bytes(data)
+    document = read(tmp_path / "in.obj")
+    write(document, untangle(document.mesh).after, tmp_path / "out.obj")
+    before, after = data.splitlines(), (tmp_path / "out.obj").read_bytes().splitlines()
+    assert [i for i, line in enumerate(before) if line != after[i]] == [4]
+    assert len(after[4].split()) == 3

@@ -197,6 +197,7 @@ def test_truncated_files(variant: str, tmp_path: Path) -> None:
         (TEXT.replace(b"vertex 1.0e0 1 0", b"vertex 1.0e0 1 0 0"), "line 12: a vertex has not three coordinates"),
         (TEXT.replace(b"vertex 1.0e0 1 0", b"vertex 1.0e0 1 o"), "line 12: 'o' is not a number"),
         (TEXT.replace(b"normal 0 0 1\n", b"normal 0 0\n"), "line 2: a facet has not one normal"),
+        (TEXT.replace(b"endsolid two", b"end two"), "is truncated: its last solid does not end"),
         (TEXT.removesuffix(b"endsolid two\n"), "is truncated: its last solid does not end"),
         (b"solid a\n", "is truncated: its last solid does not end"),
         (binary(np.eye(3)[None])[:-1], "is truncated: it announces 1 facet, for which 1 byte is missing"),
@@ -226,3 +227,18 @@ def test_odd_lines_and_line_ends_do_not_matter() -> None:
 def test_files_without_facets() -> None:
     for data in (b"solid\nendsolid\n", bytes(84)):
         assert len(parse(data).points) == len(parse(data).cells[0].vertices) == 0
+
+
+def test_a_facet_may_have_no_normal_and_a_solid_end_in_two_words() -> None:
+    data = TEXT.replace(b"facet normal 0 0 1", b"facet", 1).replace(b"endsolid two", b"End Solid two")
+    source = parse(data)
+    points = source.points.copy()
+    points[1:, 2] = 1.0
+    after = rewritten(data, points, [])
+    np.testing.assert_array_equal(parse(after).points, points)
+    facets = [line.split() for line in after.splitlines() if line.split()[:1] == [b"facet"]]
+    assert [len(words) for words in facets] == [1, 5]
+    normal = np.array([float(word) for word in facets[1][2:]])
+    a, b, c = points[source.cells[0].vertices[1]]
+    np.testing.assert_allclose(normal, np.cross(b - a, c - a) / np.linalg.norm(np.cross(b - a, c - a)), atol=1e-15)
+    assert after.endswith(b"End Solid two\n")

@@ -180,7 +180,8 @@ def build(
     held = {"on other cells of the file": _on_other_cells(solved, len(points))}
     if source.held is not None:
         held["by the file"] = source.held
-    held |= {f"by --fix {one}": _fixed_by(source, one) for one in fix}
+    named = {one: _fixed_by(source, one) for one in fix}
+    held |= {f"by --fix {one}": mask for one, mask in named.items()}
     mesh = replace(Mesh.build(points, solved.blocks, threads=threads), apart=source.apart)
     if not source.oriented:  # the numbering says nothing
         mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
@@ -204,6 +205,7 @@ def build(
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
     seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
     notes = (*source.notes, *_notes(mesh, solved, seen_from_above, copies), *_concave(mesh, form))
+    notes += tuple(f"--fix {one} holds no vertex: there is none in it" for one, mask in named.items() if not mask.any())
     fixed = {reason: count for reason, count in fixed.items() if count}
     ids = solved.of_elements(_ids(source))
     ids = ids if topology.m == len(ids) else ids[topology.source]

@@ -124,7 +124,9 @@ def test_sets_of_abaqus_are_held(inp: Path) -> None:
     expected = {*core[:3].tolist(), *(cells[:2].ravel()[free[cells[:2].ravel()]]).tolist()}
     assert set(np.flatnonzero(free & ~both.mesh.movable).tolist()) == expected
     assert both.fixed["by --fix Core"] + both.fixed["by --fix Tips"] == len(expected)
-    assert read(inp, fix="Nothing").fixed == read(inp).fixed
+    nothing = read(inp, fix="Nothing")
+    assert nothing.fixed == read(inp).fixed
+    assert "--fix Nothing holds no vertex: there is none in it" in nothing.notes
 
 
 def test_groups_are_listed(inp: Path) -> None:

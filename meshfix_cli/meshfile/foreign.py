@@ -1,7 +1,8 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
 Source: "MFEM mesh formats"; FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user
-documentation, "Build a mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide"; Kratos wiki.
+documentation, "Build a mesh"; SEACAS, "exotxt"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide";
+Kratos wiki.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ _FOREIGN = (
     ("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),
     ("Ansys Fluent", r"\(\s*\d+\s+[\"(\d]", ""),
     ("LS-DYNA", r"(?:\$[^\n]*\n\s*)*\*(?:KEYWORD|NODE[\s_%](?s:.*)\*ELEMENT_|PART\s|ELEMENT_)", ""),
+    ("exotxt", r"! Database Title", ""),
+    ("MOVIE.BYU", r"\d+ +\d+ +\d+ +\d+\s*\n\s*\d+ +\d+", ".g"),
     ("FreeFEM", rf"\d+ +\d+ +\d+\s*\n\s*(?:{_NUMBER}\s+){{2,3}}\d+\s*\n", ".msh"),
 )
 
@@ -146,7 +149,7 @@ _UCD_TYPES = {
 def words_lost(before: bytes, after: bytes) -> list[str]:
     """Return the words and names of a file that another, written of it, does not have.
 
-    Comments do not count. Of binary files those of HDF5 and of netCDF have names.
+    Comments do not count. Of binary files those of HDF5 have names.
     """
     kept = {word.upper() for word in _words(after)}
     return [word for word in dict.fromkeys(_words(before)) if word.upper() not in kept]
@@ -155,8 +158,6 @@ def words_lost(before: bytes, after: bytes) -> list[str]:
 def _words(data: bytes) -> Iterator[str]:
     if data.startswith(b"\x89HDF"):
         yield from _names_in_hdf5(data)
-    elif data.startswith(b"CDF"):
-        yield from (word.decode() for word in re.findall(rb"(?<![!-~])[A-Za-z_][\w .-]{3,31}(?=\0)", data))
     elif b"\0" not in data:
         for word in re.findall(rb"[A-Za-z_][\w.-]*", _COMMENT.sub(b"", data)):
             if not re.fullmatch(rb"[eEdD][-+]?\d*", word):  # of a number

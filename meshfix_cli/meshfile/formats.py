@@ -148,6 +148,12 @@ def _xdmf(_: bytes, text: str) -> Format | None:
     return Format("xdmf") if _is_xml(text) and "<Xdmf" in text else None
 
 
+def _exodus(data: bytes, text: str) -> Format | None:
+    if data[:4] in (b"CDF\1", b"CDF\2", b"CDF\5"):
+        return Format("exodus")
+    return _in_hdf5(b"floating_point_word_size", "exodus")(data, text)
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -211,6 +217,11 @@ OWN = {
         "med", _in_hdf5(b"ENS_MAA", "med"), {".med": "med", ".mmed": "med", ".rmed": "med"}, "MED",
         "versions 2 to 4, of one mesh at one step, also compressed; fields of one step are data", "families; groups",
         "`h5py`",
+    ),
+    "exodus": Own(
+        "exodus", _exodus, dict.fromkeys((".e", ".exo", ".ex2", ".exii", ".g", ".gen"), "exodus"), "Exodus II",
+        "netCDF of every form; one piece of a decomposition (`.e.4.0`) alone; polygons and polyhedra are held",
+        "blocks; sets of nodes, sides and elements", "`h5py`, where it is netCDF-4",
     ),
     "su2": Own("su2", _su2, {".su2": "su2"}, "SU2", "zones, markers, boxes of deformation", "zones; markers"),
 }  # fmt: skip

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile import foreign, formats, med
+from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.solved import solved_runs
@@ -29,7 +30,6 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
-BLOCK = "exodus:block"
 _OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
@@ -37,6 +37,7 @@ _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _PLAIN = {b"R3D3": b"CPS3", b"CAX4P": b"CPS4", b"C3D8RH": b"C3D8"}
 _TURNED = ("vtk", "vtu")
 _WITH_SETS = ("abaqus", "exodus")
+_ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
 
 
 def read(data: bytes, form: Format, path: Path | None = None) -> Source:
@@ -132,9 +133,10 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
 
 
 def _in_order_of(form: Format, run: Cells) -> Any:
-    """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, not for MED."""
-    if form.reader == "med" and run.type in med.ORDER:
-        return run.vertices[:, np.argsort(med.ORDER[run.type])]
+    """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, and no others."""
+    order = _ORDERS.get(form.reader, {}).get(run.type)
+    if order is not None:
+        return run.vertices[:, np.argsort(order)]
     return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices
 
 
@@ -160,8 +162,6 @@ def _source(mesh: Any, data: bytes, form: Format) -> Source:
     points = _native(mesh.points)
     cells = _numbered([Cells(block.type, _native(block.data)) for block in mesh.cells], foreign.numbers(data, form))
     cell = {name: [_native(data) for data in runs] for name, runs in mesh.cell_data.items()}
-    if form.name == "exodus":  # whose blocks are the regions; meshio has a run for each, and does not number them
-        cell[BLOCK] = [np.full(len(run.vertices), number) for number, run in enumerate(cells, 1)]
     arrays = Arrays(
         point={name: _native(data) for name, data in mesh.point_data.items()},
         cell=cell,

@@ -154,6 +154,11 @@ def _exodus(data: bytes, text: str) -> Format | None:
     return _in_hdf5(b"floating_point_word_size", "exodus")(data, text)
 
 
+def _cgns(data: bytes, text: str) -> Format | None:
+    old = data[4:24] == b"ADF Database Version"  # what CGNS had before HDF5
+    return Format("cgns") if old else _in_hdf5(b"CGNSLibraryVersion", "cgns")(data, text)
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -222,6 +227,12 @@ OWN = {
         "exodus", _exodus, dict.fromkeys((".e", ".exo", ".ex2", ".exii", ".g", ".gen"), "exodus"), "Exodus II",
         "netCDF of every form; one piece of a decomposition (`.e.4.0`) alone; polygons and polyhedra are held",
         "blocks; sets of nodes, sides and elements", "`h5py`, where it is netCDF-4",
+    ),
+    "cgns": Own(
+        "cgns", _cgns, {".cgns": "cgns"}, "CGNS",
+        "of HDF5, one base; sections, and blocks of points; zones are joined by their interfaces, else where their "
+        "boundaries are at one place; no polygons or polyhedra",
+        "families of zones and cells; boundary conditions, which are held, and sections", "`h5py`",
     ),
     "su2": Own("su2", _su2, {".su2": "su2"}, "SU2", "zones, markers, boxes of deformation", "zones; markers"),
 }  # fmt: skip

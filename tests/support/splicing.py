@@ -13,7 +13,7 @@ import numpy as np
 from meshfix_cli import read, untangle, write
 from meshfix_cli.meshfile.document import Document
 
-FORMATS = ("gmsh", "vtk", "vtu", "obj", "abaqus", "medit", "ply", "stl", "su2", "med", "exodus", "xdmf")
+FORMATS = ("gmsh", "vtk", "vtu", "obj", "abaqus", "medit", "ply", "stl", "su2", "med", "exodus", "cgns", "xdmf")
 MODULES = {name: importlib.import_module(f"files_{name}") for name in FORMATS}
 WORD = re.compile(rb"([^\s,]+)")
 

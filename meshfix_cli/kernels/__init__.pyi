@@ -5,6 +5,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
 Float64 = NDArray[np.float64]
@@ -59,6 +60,16 @@ class Connectivity:
 
     def boundary(self) -> NDArray[np.uint8]:
         """1 for the vertices (k,) of facets that belong to one element."""
+
+    def edges(self, table: Int8, threads: int) -> tuple[Int32, Int32]:
+        """Offsets (n+1,) and larger ends (e,) of the edges, which are at their smaller ends; ascending.
+
+        The table has a row for each edge of a type, (code, group of parallel edges, node, node), those of a group
+        together. All of this is of elements that are not all simplices.
+        """
+
+    def rows_of_edges(self, table: Int8, edges: tuple[Int32, Int32]) -> Int32:
+        """Return the row (e,) of each edge: those that are parallel in the ideal element are of one."""
 
     def fixed_facets(
         self, movable: NDArray[np.bool_], threads: int, other_diagonal: bool = False
@@ -216,10 +227,17 @@ def crossings_and_folds(points: Float64, facets: Int32, shared: Uint8, threads: 
     Those that are `shared` (f,) have their insides on both sides.
     """
 
-def embedding(points: Float64, mesh: Connectivity, free: NDArray[np.bool_], weights: Float64, threads: int) -> Float64:
+def embedding(
+    points: Float64,
+    mesh: Connectivity,
+    free: NDArray[np.bool_],
+    edges: tuple[Int32, Int32],
+    weights: Float64,
+    threads: int,
+) -> Float64:
     """Return the points (n, d) with each free one (n,) at the mean of its neighbours; needs the stars.
 
-    There is a weight for each of `mesh.neighbours`; (0,): all are the same.
+    Where elements are not all simplices, the neighbours are those of `Connectivity.edges`, with weights (e,).
     """
 
 def enclosing(points: Float64, facets: Int32, parts: Int32, places: Float64, own: Int32, threads: int) -> Int32:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +16,16 @@ from meshfix_cli.mesh.topology import Block, Topology, crowded_facet, moebius, n
 
 Blocks = Sequence[tuple[Element, NDArray[np.int32]]]
 WIDTH = 4  # vertices of the largest facets
+# The edges of all types, as `Connectivity.edges` takes them.
+PARALLEL = np.array(
+    [
+        (code, group, *ends)
+        for code, element in enumerate(JUDGED)
+        for group, edges in enumerate(element.shape.parallel)
+        for ends in edges
+    ],
+    dtype=np.int8,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,27 +112,13 @@ class MixedTopology(Topology):
 
     def edges(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
         """Return the two ends (e,) of each edge, once, in the numbers of the connectivity."""
-        keys = np.unique(np.concatenate([edges.ravel() for edges in parallel_edges(self.connectivity)]))
-        return ends_of(keys)
+        offsets, ends = self.connectivity.edges(PARALLEL, 1)
+        return smaller_ends(offsets), ends
 
 
-def parallel_edges(mesh: kernels.Connectivity) -> Iterator[NDArray[np.int64]]:
-    """Give the edges (k, g) by groups that are parallel in the ideal element, each as one number; see `as_edges`."""
-    for code in np.unique(mesh.codes):
-        here = np.flatnonzero(mesh.codes == code)
-        for group in JUDGED[code].shape.parallel:
-            ends = mesh.nodes[mesh.node_offsets[here, None, None] + np.array(group)].astype(np.int64)
-            yield as_edges(ends[..., 0], ends[..., 1])
-
-
-def as_edges(one: NDArray[np.integer], other: NDArray[np.integer]) -> NDArray[np.int64]:
-    """Return a number for each pair of vertices, whichever comes first."""
-    return np.minimum(one, other).astype(np.int64) << 32 | np.maximum(one, other)
-
-
-def ends_of(edges: NDArray[np.int64]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return the two vertices of edges, the smaller first."""
-    return (edges >> 32).astype(np.int32), (edges & 0xFFFFFFFF).astype(np.int32)
+def smaller_ends(offsets: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return the smaller end (e,) of each of `Connectivity.edges`."""
+    return np.repeat(np.arange(len(offsets) - 1, dtype=np.int32), np.diff(offsets))
 
 
 def checked_blocks(cells: Sequence[tuple[str, ArrayLike]], n: int, dimension: int) -> Blocks:

@@ -165,7 +165,7 @@ def minimisations_to(
 def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int = 1) -> Array:
     """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
 
-    Where elements are not all simplices, the neighbours have the weights of `inverse_lengths`.
+    Where elements are not all simplices, the neighbours are those along edges, with the weights of `inverse_lengths`.
 
     Returns
     -------
@@ -173,7 +173,7 @@ def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_],
         In the plane valid wherever the boundary is convex. Source: W. T. Tutte, "How to draw a graph", Proceedings of
         the London Mathematical Society 13 (1963).
     """
-    return kernels.embedding(start, mesh, free, inverse_lengths(start, mesh, free), threads)
+    return kernels.embedding(start, mesh, free, *inverse_lengths(start, mesh, free, threads), threads)
 
 
 class _Region(Region):

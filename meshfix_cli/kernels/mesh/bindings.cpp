@@ -169,6 +169,27 @@ auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movab
                            to_numpy(std::move(found.owners)), to_numpy(std::move(found.shared)));
 }
 
+// Rows of a shape's code, the group of parallel edges, which is another than that of the row before, and two nodes.
+EdgeTable table_of(const Matrix<const std::int8_t>& rows) {
+    EdgeTable table;
+    for (std::size_t i = 0; i < rows.shape(0); ++i)
+        table.of_shape.at(rows(i, 0)).push_back({rows(i, 1), rows(i, 2), rows(i, 3)});
+    return table;
+}
+
+auto edges_py(const PyConnectivity& self, const Matrix<const std::int8_t>& table, int threads) {
+    EdgeList edges = with_dimension(
+        self.dimension, [&](auto) { return find_edges(self.mesh.elements, table_of(table), self.mesh.n(), threads); });
+    return std::make_pair(to_numpy(std::move(edges.offsets)), to_numpy(std::move(edges.ends)));
+}
+
+auto rows_of_edges_py(const PyConnectivity& self, const Matrix<const std::int8_t>& table, const PyEdges& edges) {
+    return to_numpy(with_dimension(self.dimension, [&](auto) {
+        return rows_of_edges(self.mesh.elements, table_of(table), edges_view(edges),
+                             static_cast<std::int64_t>(edges.second.size()));
+    }));
+}
+
 auto used_vertices_py(const Matrix<const std::int32_t>& simplices, std::int64_t n) {
     return to_numpy(used_vertices(simplices.data(), static_cast<std::int64_t>(simplices.size()), n));
 }
@@ -299,6 +320,8 @@ void bind_mesh(nb::module_& m) {
         .def("grown", &grown_py, "mask"_a.noconvert(), "rings"_a)
         .def("stuck", &stuck_py, "movable"_a.noconvert(), "threads"_a)
         .def("boundary", &boundary_py)
+        .def("edges", &edges_py, "table"_a.noconvert(), "threads"_a)
+        .def("rows_of_edges", &rows_of_edges_py, "table"_a.noconvert(), "edges"_a)
         .def("fixed_facets", &fixed_facets_py, "movable"_a.noconvert(), "threads"_a, "other_diagonal"_a = false)
         .def_prop_ro("crowded", [](PyConnectivity& self) { return self.mesh.crowded; })
         .def_prop_ro("orientable", [](PyConnectivity& self) { return self.mesh.orientable; })

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "arrays.hpp"
+#include "mesh/edges.hpp"
 #include "mesh/star.hpp"
 #include "mesh/stars.hpp"
 
@@ -16,6 +17,10 @@ struct PyConnectivity {
     std::mutex building{};  // of the stars, which come later
     std::atomic<bool> has_stars{false};
 };
+
+using PyEdges = std::pair<Vector<const std::int32_t>, Vector<const std::int32_t>>;  // offsets and ends
+
+inline EdgesView edges_view(const PyEdges& edges) { return {edges.first.data(), edges.second.data()}; }
 
 inline const std::uint8_t* bytes_of(const Vector<const bool>& mask, std::int64_t expected) {
     if (static_cast<std::int64_t>(mask.shape(0)) != expected) throw nb::value_error("the mask is of another mesh");

@@ -117,14 +117,15 @@ auto min_norm_point_py(const Matrix<const double>& vectors) {
 
 // The points, the free ones at the mean of their neighbours, by weights where there are any.
 auto embedding_py(const Matrix<const double>& points, const PyConnectivity& self, const Vector<const bool>& free,
-                  const Vector<const double>& weights, int threads) {
+                  const PyEdges& edges, const Vector<const double>& weights, int threads) {
     if (!self.has_stars) throw nb::value_error("the stars are not built");
     check_points(points, self);
     const std::uint8_t* mask = bytes_of(free, self.mesh.n());
     std::vector<double> embedded(points.data(), points.data() + points.size());
     with_dimension(points.shape(1), [&](auto d) {
-        const double* by = weights.size() == self.mesh.neighbours.size() ? weights.data() : nullptr;
-        Embedding<d>(stars_of(self.mesh), points.data(), mask, by, self.mesh.n(), threads).move(embedded.data());
+        const double* by = self.mesh.elements.empty() ? nullptr : weights.data();
+        Embedding<d>(stars_of(self.mesh), points.data(), mask, edges_view(edges), by, self.mesh.n(), threads)
+            .move(embedded.data());
         return 0;
     });
     return to_numpy(std::move(embedded), points.shape(1));
@@ -263,8 +264,8 @@ void bind_moves(nb::module_& m) {
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;
 
-    m.def("embedding", &embedding_py, "points"_a.noconvert(), "mesh"_a, "free"_a.noconvert(), "weights"_a.noconvert(),
-          "threads"_a);
+    m.def("embedding", &embedding_py, "points"_a.noconvert(), "mesh"_a, "free"_a.noconvert(), "edges"_a,
+          "weights"_a.noconvert(), "threads"_a);
     nb::class_<PyFoldover> foldover(m, "Foldover");
     bind_foldover<Sizes>(m, foldover);
     bind_foldover<Inverses>(m, foldover);

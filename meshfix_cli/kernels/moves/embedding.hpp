@@ -10,6 +10,7 @@
 
 #include "common/numbers.hpp"
 #include "common/vec.hpp"
+#include "mesh/edges.hpp"
 #include "mesh/star.hpp"
 
 namespace meshfix {
@@ -17,9 +18,9 @@ namespace meshfix {
 template <int D>
 class Embedding {
  public:
-    // weights: of the star's neighbours, one star behind the other; null: all are 1.
-    Embedding(StarsView stars, const double* points, const std::uint8_t* free, const double* weights, std::int64_t n,
-              int threads)
+    // weights: of the edges, neighbours that have none do not count; null: all neighbours have the weight 1.
+    Embedding(StarsView stars, const double* points, const std::uint8_t* free, EdgesView edges, const double* weights,
+              std::int64_t n, int threads)
         : threads_(threads) {
         std::vector<std::int32_t> number(n, -1);
         for (std::int64_t v = 0; v < n; ++v) {
@@ -33,7 +34,12 @@ class Embedding {
             double count = 0.0;
             for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i) {
                 const std::int32_t other = stars.neighbours[i];
-                const double weight = weights == nullptr ? 1.0 : weights[i];
+                double weight = 1.0;
+                if (weights != nullptr) {
+                    const std::int32_t edge = edges.find(v, other);
+                    if (edge < 0) continue;
+                    weight = weights[edge];
+                }
                 count += weight;
                 if (number[other] >= 0) {
                     neighbours_.push_back(number[other]);

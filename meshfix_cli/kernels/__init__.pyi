@@ -53,7 +53,7 @@ class Connectivity:
         """Do it, where it is not done; ValueError where a star or the mesh is too large to be numbered."""
 
     def grown(self, mask: NDArray[np.bool_], rings: int) -> NDArray[np.uint8]:
-        """Mark these vertices (n,) and rings of neighbours."""
+        """Mark these vertices (n,) and rings of neighbours; needs the stars."""
 
     def stuck(self, movable: NDArray[np.bool_], threads: int) -> Int32:
         """Elements without a movable vertex."""

@@ -212,9 +212,7 @@ class Topology:
         -------
         (n,) bool
         """
-        return vertices | self.of_vertices(
-            self.connectivity.grown(vertices[self.connectivity.vertices], rings).view(bool)
-        )
+        return vertices | self.of_vertices(self.stars().grown(vertices[self.connectivity.vertices], rings).view(bool))
 
     def owners(self, simplices: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the elements of corner simplices, both by their numbers in the connectivity."""

@@ -79,3 +79,15 @@ def test_parallel_edges_get_the_lengths_of_the_boundary() -> None:
     (offsets, ends), weights = inverse_lengths(here, stars, free, 1)
     length = np.linalg.norm(here[smaller_ends(offsets)] - here[ends], axis=1)
     np.testing.assert_allclose(weights * length, weights[0] * length[0], rtol=1e-12)
+
+
+@every
+def test_rings_are_those_of_the_corner_simplices(name: str, random: np.random.Generator) -> None:
+    mesh = Mesh.build(*MESHES[name]())
+    stars = mesh.topology.stars()
+    marked = random.uniform(size=len(stars.vertices)) < 0.01
+    for rings in range(4):
+        grown = marked.copy()
+        for _ in range(rings):
+            grown[stars.simplices[grown[stars.simplices].any(axis=1)]] = True
+        np.testing.assert_array_equal(stars.grown(marked, rings).view(bool), grown)

@@ -137,11 +137,10 @@ void restore(PyConnectivity& self, const State& state) {
 }
 
 auto grown_py(const PyConnectivity& self, const Vector<const bool>& mask, int rings) {
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
     const std::uint8_t* bytes = bytes_of(mask, self.mesh.n());
     std::vector<std::uint8_t> marked(bytes, bytes + self.mesh.n());
-    with_dimension(self.dimension, [&](auto d) {
-        for (int ring = 0; ring < rings; ++ring) grow<d>(self.mesh, marked);
-    });
+    with_dimension(self.dimension, [&](auto) { grow(self.mesh, marked, rings); });
     return to_numpy(std::move(marked));
 }
 

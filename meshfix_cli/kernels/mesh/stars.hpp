@@ -322,17 +322,21 @@ void build_stars(Connectivity& mesh, int threads) {
     colour_blocks(mesh, threads);
 }
 
-// Marks the vertices of all simplices that have a marked one.
-template <int D>
-void grow(const Connectivity& mesh, std::vector<std::uint8_t>& marked) {
-    const std::vector<std::uint8_t> before = marked;
-    const auto count = static_cast<std::int64_t>(mesh.simplices.size()) / (D + 1);
-    for (std::int64_t s = 0; s < count; ++s) {
-        const std::int32_t* simplex = &mesh.simplices[s * (D + 1)];
-        bool any = false;
-        for (int k = 0; k <= D; ++k) any |= before[simplex[k]] != 0;
-        if (!any) continue;
-        for (int k = 0; k <= D; ++k) marked[simplex[k]] = 1;
+// Marks so many rings of neighbours around the marked vertices.
+inline void grow(const Connectivity& mesh, std::vector<std::uint8_t>& marked, int rings) {
+    std::vector<std::int32_t> rim, next;
+    for (std::size_t v = 0; v < marked.size(); ++v)
+        if (marked[v]) rim.push_back(static_cast<std::int32_t>(v));
+    for (int ring = 0; ring < rings; ++ring) {
+        next.clear();
+        for (const std::int32_t v : rim)
+            for (std::int32_t i = mesh.neighbour_offsets[v]; i < mesh.neighbour_offsets[v + 1]; ++i) {
+                const std::int32_t other = mesh.neighbours[i];
+                if (marked[other]) continue;
+                marked[other] = 1;
+                next.push_back(other);
+            }
+        rim.swap(next);
     }
 }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,26 +19,26 @@ class Judged:
 
     The quality of a simplex is its smallest (dihedral) angle, that of another element the angle whose sine is the
     smallest scaled Jacobian at its corners.
-
-    Attributes
-    ----------
-    simplices : (s, d+1) int32
-        Their corner simplices.
     """
 
     def __init__(self, mesh: kernels.Connectivity, rows: NDArray[np.integer] | None = None) -> None:
         """Take the rows (k,) of elements; None: all of them."""
         self._mesh, self._rows = mesh, rows
         if self.simplicial:
-            self.simplices = mesh.simplices if rows is None else mesh.simplices[rows]
             return
         self._codes, self._offsets, self._nodes = mesh.codes, mesh.node_offsets, mesh.nodes
-        self.simplices = mesh.simplices
         if rows is not None:
             self._codes = mesh.codes[rows]
             self._nodes = mesh.nodes[_spans(mesh.node_offsets, rows)]
             self._offsets = _offsets(np.array([one.nodes for one in JUDGED])[self._codes])
-            self.simplices = mesh.simplices[_spans(mesh.simplex_offsets, rows)]
+
+    @cached_property
+    def simplices(self) -> NDArray[np.int32]:
+        """(s, d+1) int32: their corner simplices."""
+        mesh, rows = self._mesh, self._rows
+        if rows is None:
+            return mesh.simplices
+        return mesh.simplices[rows if self.simplicial else _spans(mesh.simplex_offsets, rows)]
 
     def __len__(self) -> int:
         if self._rows is not None:

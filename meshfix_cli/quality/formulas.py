@@ -12,6 +12,7 @@ from meshfix_cli.quality import corners, simplices
 from meshfix_cli.quality.metrics import METRICS
 
 Array = NDArray[np.float64]
+AT_ONCE = 16384  # elements: what is computed of so many stays in the caches, and takes little memory
 
 
 def evaluate(name: str, mesh: Mesh) -> Array:
@@ -30,8 +31,11 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     """
     values = np.full(mesh.topology.m, np.nan)
     for block in mesh.topology.blocks:
-        if block.element.key in METRICS[name].elements:
-            values[block.rows] = evaluate_at(name, block.element, mesh.points[block.vertices])
+        if block.element.key not in METRICS[name].elements:
+            continue
+        for start in range(0, len(block.rows), AT_ONCE):
+            some = slice(start, start + AT_ONCE)
+            values[block.rows[some]] = evaluate_at(name, block.element, mesh.points[block.vertices[some]])
     return values
 
 

@@ -18,22 +18,20 @@ class Region:
 
     Attributes
     ----------
-    rows : (s,) int
+    rows : (s,) int32
         The simplices of the stars.
     moving : (f,) int
         The free vertices, in the numbers of the mesh.
     vertices : (k,) int
         These, then the others of the stars.
-    global_simplices : (s, d+1) int32
-        The simplices of the stars, in the numbers of the mesh.
     simplices : (s, d+1) int32
-        The same, with the vertices numbered as in `vertices`.
+        The simplices of the stars, with the vertices numbered as in `vertices`.
     elements : Judged or None
         The elements with a free vertex; None: they are the simplices.
     """
 
     def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_]) -> None:
-        self.rows = np.flatnonzero(free[mesh.simplices].any(axis=1))
+        self.rows = np.flatnonzero(free[mesh.simplices].any(axis=1)).astype(np.int32)
         simplices = mesh.simplices[self.rows]
         rim = np.zeros(len(free), dtype=bool)
         rim[simplices] = True
@@ -41,9 +39,14 @@ class Region:
         self.vertices = np.concatenate([self.moving, np.flatnonzero(rim & ~free)])
         number = np.full(len(free), -1, dtype=np.int32)
         number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
-        self.global_simplices = np.ascontiguousarray(simplices)
-        self.simplices = np.ascontiguousarray(number[simplices])
+        self.simplices = number[simplices]
         self.elements = None if mesh.simplicial else Judged(mesh, distinct(mesh.owners[self.rows]))
+        self._mesh = mesh
+
+    @property
+    def global_simplices(self) -> NDArray[np.int32]:
+        """(s, d+1) int32: the simplices of the stars in the numbers of the mesh; made each time, as they are large."""
+        return self._mesh.simplices[self.rows]
 
     def retreated(self, start: Array, moved: Array, least: float, threads: int) -> Array:
         """Return moved points (n, d) where no element of the region is inverted, and none gets very small.
@@ -60,10 +63,10 @@ class Region:
             Of the corner simplices, in model units.
         threads : int
         """
-        way, share = moved - start, np.ones((len(start), 1))
+        way, share, simplices = moved - start, np.ones((len(start), 1)), self.global_simplices
         for _ in range(RETREATS):
-            measure, valid = kernels.measure(moved, self.global_simplices, threads)
-            wrong = self.global_simplices[(valid == 0) | (measure < least)]
+            measure, valid = kernels.measure(moved, simplices, threads)
+            wrong = simplices[(valid == 0) | (measure < least)]
             if self.elements is not None:
                 inverted = self.elements.vertices(self.elements.check(moved, threads)[0])
                 wrong = np.concatenate([wrong.ravel(), inverted])

@@ -74,6 +74,7 @@ class Assembly {
     void number_shares(std::int64_t n) {
         constexpr std::size_t CORNERS_PER_ITEM = SIMPLICES_PER_ITEM * (D + 1);
         std::vector<std::int32_t> vertices, newest(n, -1);
+        share_of_.reserve(simplices_.size());
         const auto count = [&] { return static_cast<std::int32_t>(vertices.size()); };
         for (std::int32_t v : simplices_) {
             if (share_of_.size() % CORNERS_PER_ITEM == 0) first_shares_.push_back(count());

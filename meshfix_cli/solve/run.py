@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
 from typing import TYPE_CHECKING
@@ -45,6 +45,29 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _Start = tuple[Array, SweepRecord, tuple[int, float]]
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
+
+
+@dataclass(frozen=True, eq=False)
+class _Passes:
+    """Passes of smoothing that were run to choose a start: the first ones of the smoothing that begins there.
+
+    Attributes
+    ----------
+    near : (k,) bool
+        The vertices that might move.
+    points : list of (k, d) float64
+        Before the first pass, and after each.
+    states : (k,) uint8
+        After the last.
+    """
+
+    near: Mask
+    points: list[Array]
+    states: NDArray[np.uint8]
+
+    def begin(self, points: Array, near: Mask, phase: Phase) -> bool:
+        """Whether a phase begins with them."""
+        return phase.moves == (Move.COMBINED_SMOOTH,) and points is self.points[0] and np.array_equal(near, self.near)
 
 
 def _raised(sine2: float, degrees: float) -> float:
@@ -104,6 +127,7 @@ class Run:
         self.near = self.free & self.broken if only_invalid else self.free
         self.reference, self.targeted = reference, reference is not None
         self.rival: _Start | None = None
+        self.ahead: _Passes | None = None
         self.kept: tuple[Array, SweepRecord, float] | None = None
         self.lost = False  # what the last minimisation of the shape began with
         self.shaped = False  # since the smallest angle was raised
@@ -202,17 +226,21 @@ class Run:
         one, other, self.rival = self.rival, self.best, None
         self.best = min(one, other, key=lambda start: start[2])
         if one[2][0] == other[2][0] == 0:
-            (smallest, mean), (its_smallest, its_mean) = self._after_passes(one[0]), self._after_passes(other[0])
+            self.floor = self.min_measure
+            (smallest, mean, ahead), (its_smallest, its_mean, its_ahead) = map(self._passes_from, (one[0], other[0]))
             same = abs(smallest - its_smallest) < math.radians(SAME)
-            self.best = one if (mean >= its_mean if same else smallest > its_smallest) else other
+            first = mean >= its_mean if same else smallest > its_smallest
+            self.best, self.ahead = (one, ahead) if first else (other, its_ahead)
         return self._return_to(*self.best[:2])
 
-    def _after_passes(self, points: Array) -> tuple[float, int]:
-        """Return the smallest of the smallest angles, in radians, and their sum, in steps."""
+    def _passes_from(self, start: Array) -> tuple[float, int, _Passes]:
+        """Return the smallest of the smallest angles after a few passes, in radians, their sum, in steps, and these."""
+        near = self.near & self.team.own_vertices
+        states, points = _due(near), [start]
         for _ in range(PASSES):
-            points = self._relocated(points, Move.COMBINED_SMOOTH, _due(self.near & self.team.own_vertices))
-        angles = self._angles(points)
-        return self._least(angles), self.team.total(self._steps(angles))
+            points.append(self._relocated(points[-1], Move.COMBINED_SMOOTH, states))
+        angles = self._angles(points[-1])
+        return self._least(angles), self.team.total(self._steps(angles)), _Passes(near, points, states)
 
     def is_done(self, phase: Phase) -> bool:
         """Whether nothing is left for a phase of untangling: sweeps are cheap, the energy needs a promise."""
@@ -289,6 +317,10 @@ class Run:
         near = near & self.team.own_vertices
         states = _due(near)
         self.floor = self.measure if Move.COME_BACK in phase.moves else self.min_measure
+        ahead, self.ahead = self.ahead, None
+        if ahead is not None and ahead.begin(self.points, near, phase):
+            yield from ahead.points[1:]
+            states = ahead.states
         for move in cycle(phase.moves):
             if len(phase.moves) > 1:  # what was visited by one move is due for the next
                 states = _due(near)

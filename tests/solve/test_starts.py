@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from elements import MESHES
 from geometries import GEOMETRIES, grid
 from meshes import tangle
 
 from meshfix_cli import Mesh, untangle
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise
-from meshfix_cli.solve.run import GAIN
+from meshfix_cli.solve.run import GAIN, _Passes
 from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, plan
 from meshfix_cli.solve.untangle import drain, steps
 
@@ -59,6 +62,29 @@ def test_the_better_start_is_kept(name: str) -> None:
     assert one.inverted <= other.inverted
     if one.inverted == other.inverted == 0:
         assert one.min_angle > other.min_angle - 0.1
+
+
+@pytest.mark.parametrize("name", ["L-shaped plate", "box with pipes", "quads and triangles", "hex plate"])
+def test_the_passes_that_chose_the_start_are_those_of_smoothing(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same bits as where the smoothing begins anew."""
+    mesh = Mesh.build(*MESHES[name]()) if name in MESHES else Mesh.build(*GEOMETRIES[name]())
+    middle = mesh.points[mesh.movable].mean(axis=0)
+    tangled = mesh.with_points(np.where(mesh.movable[:, None], middle, mesh.points))
+    used, begin = [], _Passes.begin
+
+    def noted(*given: Any) -> bool:
+        used.append(begin(*given))
+        return used[-1]
+
+    monkeypatch.setattr(_Passes, "begin", noted)
+    known = untangle(tangled)
+    monkeypatch.setattr(_Passes, "begin", lambda *_: False)
+    anew = untangle(tangled)
+    assert True in used
+    assert known.after.points.tobytes() == anew.after.points.tobytes()
+    assert [(r.phase, r.sweep, r.inverted, r.moved) for r in known.records] == [
+        (r.phase, r.sweep, r.inverted, r.moved) for r in anew.records
+    ]
 
 
 @pytest.mark.parametrize("name", ["plate with holes", "annulus", "box with pipes", "block"])

@@ -68,6 +68,7 @@ stress: $(VENV)/installed ## untangle 477 hard cases; which are solved, how fast
 bench: $(VENV)/installed ## kernels, MESH=FILE for a mesh of yours; the process up to 10 million tets; files; many meshes
 	$(BIN)/python benchmarks/kernels.py $(MESH)
 	$(BIN)/python benchmarks/process.py
+	$(BIN)/python benchmarks/process_elements.py
 	$(BIN)/python benchmarks/files.py
 	$(BIN)/python benchmarks/batch.py
 

@@ -12,6 +12,7 @@ import compare
 import generate
 import kernels
 import process
+import process_elements
 import pytest
 import stress
 import tables
@@ -51,6 +52,17 @@ def test_the_process_is_timed_in_phases(monkeypatch: pytest.MonkeyPatch, capsys:
     printed = capsys.readouterr().out
     assert all(phase in printed for phase in PHASES)
     assert printed.count(" / ") == 6
+
+
+def test_the_process_on_other_elements_is_timed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        sys, "argv", ["process_elements.py", "--counts", "100", "200", "--files", "binary VTK", "--repeats", "1"]
+    )
+    process_elements.main()
+    printed = capsys.readouterr().out
+    assert all(printed.count(f"{box}, binary VTK: an element") == 1 for box in process_elements.BOXES)
 
 
 def test_many_meshes_are_timed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -374,7 +374,7 @@ def test_other_formats_and_streams(tmp_path: Path) -> None:
     run("untangle", "-q", path, tmp_path / "out.vtu")
     assert read(tmp_path / "out.vtu").mesh.check()[0] == 0
     said = run("quality", "-", data=path.read_bytes(), code=1).stderr
-    assert b"is beside it, so it is read from its file and not from a stream" in said
+    assert b"is beside it: it is read neither from a stream nor compressed" in said
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def parse(data: bytes, path: Path | None = None) -> Source:
 
     def beside(name: str) -> bytes:
         if path is None:
-            raise ReadError(f"names {name!r}, which is beside it, so it is read from its file and not from a stream")
+            raise ReadError(f"names {name!r}, which is beside it: it is read neither from a stream nor compressed")
         with naming(name):
             return _read(path, name)
 

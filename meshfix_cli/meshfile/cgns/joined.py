@@ -57,7 +57,7 @@ class Shared:
         return self.layout.rewritten(self.copies, np.where(moved, points[self.rows], self.copies), reversed_cells)
 
 
-def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells], threads: int = 1) -> tuple[Int64, Int64] | None:
+def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells]) -> tuple[Int64, Int64] | None:
     """Find the points of the mesh.
 
     Parameters
@@ -84,7 +84,7 @@ def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells], threads:
             told.append(start + (_poles if known else _cuts)(zone.shape, mine))
     labels = _united(np.concatenate([np.empty((2, 0), np.int64), *told], axis=1), len(points))
     if len(zones) > 1 and not known:
-        labels = _at_one_place(zones, points, cells, labels, threads)
+        labels = _at_one_place(zones, points, cells, labels)
     if (labels == np.arange(len(points))).all():
         return None
     used = np.zeros(len(points), dtype=bool)
@@ -129,14 +129,14 @@ def _poles(shape: tuple[int, ...], points: NDArray[np.float64]) -> Int64:
     return np.concatenate(found, axis=1)
 
 
-def _at_one_place(zones: Sequence[Zone], points: Points, cells: Sequence[Cells], labels: Int64, threads: int) -> Int64:
+def _at_one_place(zones: Sequence[Zone], points: Points, cells: Sequence[Cells], labels: Int64) -> Int64:
     """Return labels that are equal also where the boundaries of two zones have points with equal coordinates."""
     _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     rows = inverse.reshape(-1)
     piece = np.repeat(np.arange(len(zones)), [zone.points for zone in zones])[first]
     runs = [Cells(run.type, rows[run.vertices]) for run in cells]
     copies = Copies([f"its zone {zone.name!r}" for zone in zones], points[first], piece, runs)
-    return by_place(copies, threads)[rows]
+    return by_place(copies)[rows]
 
 
 def _interfaces(zones: Sequence[Zone], starts: Sequence[int], here: int, points: Points) -> Iterator[Int64 | None]:

@@ -12,6 +12,7 @@ from shapes import block, plate
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.document import Document
 
 FOREIGN = {
@@ -55,7 +56,6 @@ def test_ucd_is_read_under_the_name_of_abaqus(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("a.su2", "NZONE= 2\nIZONE= 1\nNDIME= 2\nNELEM= 0\n", "several zones"),
         ("a.mdpa", "Begin Nodes\nEnd Nodes\nBegin Elements Element9D9N\nEnd Elements\n", "called Element9D9N"),
     ],
 )  # fmt: skip
@@ -65,29 +65,18 @@ def test_what_would_be_misread_is_refused(name: str, text: str, words: str, tmp_
         read(tmp_path / name)
 
 
-def su2(folder: Path, middle: str = "0.5 0.5") -> Path:
-    path = folder / "mesh.su2"
-    path.write_text(
-        "% a comment\nNDIME= 2\nNELEM= 6\n5 0 1 6 0\n9 1 2 5 4 1\n5 1 4 6 2\n5 4 3 6 3\n5 3 0 6 4\n5 4 5 7 5\n"
-        f"NPOIN= 8\n0 0 0\n1 0 1\n2 0 2\n0 1 3\n1 1 4\n2 1 5\n{middle} 6\n1.5 2 7\n"
-        "NMARK= 1\nMARKER_TAG= wall\nMARKER_ELEMS= 2\n3 0 1\n3 1 2\n"
-    )
-    return path
-
-
-def test_elements_have_the_numbers_of_the_file(tmp_path: Path) -> None:
-    document = read(su2(tmp_path))
-    assert document.ids.tolist() == [0, 2, 3, 4, 5, 1]  # the quadrilateral is the second
-    assert document.not_judged == {}
-
-
 def test_an_unmoved_mesh_comes_back_byte_for_byte_and_a_moved_one_tells_what_it_lost(tmp_path: Path) -> None:
-    path = su2(tmp_path)
-    run("untangle", "-q", path, tmp_path / "out.su2")
-    assert (tmp_path / "out.su2").read_bytes() == path.read_bytes()
-    text = run("untangle", su2(tmp_path, "1.5 0.5"), tmp_path / "out.su2").stdout.decode()
+    points, cells = block()
+    valid = untangle(Mesh.build(points, cells)).after.points
+    for name, coordinates in (("valid", valid), ("tangled", points)):
+        path = tmp_path / f"{name}.vol"
+        meshio.Mesh(coordinates, [("tetra", cells)]).write(path, file_format="netgen")
+        path.write_text(path.read_text().replace("endmesh", "face_colours\n1\n1 0.5 0.5 0.5\n\nendmesh"))
+    run("untangle", "-q", "--smooth", "0", tmp_path / "valid.vol", tmp_path / "out.vol")
+    assert (tmp_path / "out.vol").read_bytes() == (tmp_path / "valid.vol").read_bytes()
+    text = run("untangle", tmp_path / "tangled.vol", tmp_path / "out.vol").stdout.decode()
     (note,) = [line for line in text.splitlines() if "written anew" in line]
-    assert {"wall", "MARKER_TAG", "line cells"} <= {*note.partition("dropped: ")[2].split(", ")}
+    assert "face_colours" in {*note.partition("dropped: ")[2].split(", ")}
 
 
 def test_regions_of_other_formats_are_held(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ class Format:
     @property
     def reader(self) -> str:
         """meshio's name of the reader."""
-        return {"gmsh22": "gmsh", "vtk42": "vtk"}.get(self.name, self.name)
+        return {"gmsh1": "gmsh", "gmsh22": "gmsh", "vtk42": "vtk"}.get(self.name, self.name)
 
 
 DRAWINGS = ("obj", "off", "ply", "stl")  # these have no plane meshes, and their faces need not be elements
@@ -74,7 +74,8 @@ def _abaqus(_: bytes, text: str) -> Format | None:
 
 def _gmsh(_: bytes, text: str) -> Format | None:
     if "$MeshFormat" not in text:
-        return None
+        first = re.search(r"^\$(?:NO[DE]|Nodes|PhysicalNames)\b", text, re.MULTILINE)
+        return Format("gmsh1", False) if first else None
     fields = text.split("$MeshFormat", 1)[1].split()
     return Format("gmsh22" if fields[:1] and fields[0].startswith("2") else "gmsh", fields[1:2] == ["1"])
 
@@ -177,8 +178,8 @@ OWN = {
     ),
     "gmsh": Own(
         "gmsh", _gmsh, {".msh": "gmsh22"}, "gmsh",
-        "2 and 4.1, text and binary, in one file or several; parameters (u, v) of nodes stay as they are",
-        "physical groups",
+        "1, 2 and 4.1, text and binary, in one file or several; parameters (u, v) of nodes stay as they are",
+        "physical groups; in version 1 also entities",
     ),
     "pvtu": Own("vtk.pvtu", _pvtu, {".pvtu": "pvtu"}, "VTK", "with its pieces, which are `.vtu`", _VTK_GROUPS),
     "vtu": Own(

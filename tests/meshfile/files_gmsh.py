@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable
 from functools import partial
@@ -160,6 +161,23 @@ def packed_2(path: Path, order: str = "<", together: int = 1) -> None:
     )  # fmt: skip
 
 
+def without_line_breaks(path: Path) -> None:
+    """Binary, version 2, as PyMesh and libigl write it: the ends of sections follow the numbers."""
+    packed_2(path, together=40)
+    path.write_bytes(re.sub(rb"\n(?=\$End)", b"", path.read_bytes()))
+
+
+def named_1(path: Path) -> None:
+    """By hand, version 1: numbers with gaps, names of groups and a section that is not known behind the elements."""
+    points, cells = shapes.plate()
+    nodes = "".join(f"{i} {x:.6f} {y:.6f} {z:g}\n" for i, (x, y, z) in enumerate(points, 11))
+    elements = "".join(f"{i} 2 1 4 3  {a} {b} {c}\n" for i, (a, b, c) in enumerate(cells + 11, 3))
+    path.write_text(
+        f"$NOD\n{len(points)}\n{nodes}$ENDNOD\n$ELM\n{len(cells) + 1}\n1 15 9 5 1 11\n{elements}$ENDELM\n"
+        '$PhysicalNames\n1\n2 1 "Blech"\n$EndPhysicalNames\n$PARA\n3 4\n$ENDPARA\n'
+    )
+
+
 def packed_4(path: Path, order: str = ">") -> None:
     """Binary, version 4.1, nodes in two blocks, the second with parameters, and an entity in two groups."""
     points, cells = shapes.plate()
@@ -180,10 +198,14 @@ def packed_4(path: Path, order: str = ">") -> None:
     )  # fmt: skip
 
 
+TEXT_1 = {"MshFileVersion": 1, "Binary": 0}
 TEXT_2, BINARY_2 = {"MshFileVersion": 2.2, "Binary": 0}, {"MshFileVersion": 2.2, "Binary": 1}
 TEXT_4, BINARY_4 = {"MshFileVersion": 4.1, "Binary": 0}, {"MshFileVersion": 4.1, "Binary": 1}
 
 FILES: dict[str, Callable[[Path], None]] = {
+    "groups_text_1.msh": partial(by_gmsh, boxes, **TEXT_1),
+    "all_text_1.msh": partial(by_gmsh, plates, SaveAll=1, **TEXT_1),
+    "named_text_1.msh": named_1,
     "groups_text_2.msh": partial(by_gmsh, boxes, **TEXT_2),
     "groups_binary_2.msh": partial(by_gmsh, boxes, **BINARY_2),
     "groups_text_4.msh": partial(by_gmsh, boxes, **TEXT_4),
@@ -210,6 +232,7 @@ FILES: dict[str, Callable[[Path], None]] = {
     "windows_2.msh": windows_2,
     "windows_4.msh": windows_4,
     "one_by_one_2.msh": packed_2,
+    "without_line_breaks_2.msh": without_line_breaks,
     "big_endian_2.msh": partial(packed_2, order=">", together=40),
     "big_endian_4.msh": packed_4,
 }

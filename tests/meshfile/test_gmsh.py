@@ -15,13 +15,14 @@ from programs import gmsh_session
 
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile import gmsh
+from meshfix_cli.meshfile import formats, gmsh
 from meshfix_cli.meshfile.gmsh.cells import TYPES
 from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
 SQUARE = "1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 .5 .5 0\n"
 FAN = "1 2 2 7 1 1 2 5\n2 2 2 7 1 2 3 5\n3 2 2 8 1 3 4 5\n4 2 2 8 1 4 1 5\n"
+FAN_1 = "1 2 7 1 3 1 2 5\n2 2 7 1 3 2 3 5\n3 2 8 1 3 3 4 5\n4 2 8 1 3 4 1 5\n"
 
 
 def text_2(nodes: str = SQUARE, elements: str = FAN, rest: str = "", version: str = "2.2") -> bytes:
@@ -30,6 +31,11 @@ def text_2(nodes: str = SQUARE, elements: str = FAN, rest: str = "", version: st
         f"$MeshFormat\n{version} 0 8\n$EndMeshFormat\n$Nodes\n{counts[0]}\n{nodes}$EndNodes\n"
         f"$Elements\n{counts[1]}\n{elements}$EndElements\n{rest}"
     ).encode()
+
+
+def text_1(elements: str = FAN_1) -> bytes:
+    count = elements.count("\n")
+    return f"$NOD\n5\n{SQUARE}$ENDNOD\n$ELM\n{count}\n{elements}$ENDELM\n".encode()
 
 
 def text_4(
@@ -64,6 +70,43 @@ def tables(source: Source) -> dict[str, Any]:
     }
 
 
+def test_version_1_holds_the_same_as_version_2() -> None:
+    first, second = tables(parsed(text_1())), tables(parsed(text_2()))
+    assert (first.pop("regions"), second.pop("regions")) == (("gmsh:physical", "gmsh:geometrical"), ("gmsh:physical",))
+    np.testing.assert_equal(first, second)
+
+
+def test_elements_of_version_1_are_those_of_its_types() -> None:
+    mixed = FAN_1.replace("3 2 8 1 3 3 4 5", "3 3 8 2 4 3 4 5 1") + "9 1 4 1 2 1 2\n"
+    source = parsed(text_1(mixed))
+    assert [(run.type, run.vertices.tolist()) for run in source.cells[1:]] == [
+        ("quad", [[2, 3, 4, 0]]), ("line", [[0, 1]]),
+    ]  # fmt: skip
+    assert [runs.tolist() for runs in source.arrays.cell["gmsh:geometrical"]] == [[1, 1, 1], [2], [1]]
+    assert [(run.ids if run.ids is None else run.ids.tolist()) for run in source.cells] == [[1, 2, 4], [3], [9]]
+
+
+def test_a_file_without_a_version_is_of_the_first() -> None:
+    names = {b"NOD": b"Nodes", b"ELM": b"Elements"}
+    data = text_1()
+    for old, new in names.items():
+        data = data.replace(b"$" + old, b"$" + new).replace(b"$END" + old, b"$End" + new)
+    np.testing.assert_equal(tables(parsed(data)), tables(parsed(text_1())))
+    assert formats.sniff(data) == formats.sniff(text_1()) == formats.Format("gmsh1", False)
+
+
+def test_names_of_groups_stand_before_version_1_too(tmp_path: Path) -> None:
+    data = b'$PARA\n3 4\n$ENDPARA\n$PhysicalNames\n1\n2 7 "steel"\n$EndPhysicalNames\n' + text_1()
+    assert {name: pair.tolist() for name, pair in parsed(data).arrays.groups.items()} == {"steel": [7, 2]}
+    assert formats.sniff(data) == formats.sniff(data[data.index(b"$Phys") :]) == formats.Format("gmsh1", False)
+
+
+def test_line_breaks_behind_binary_numbers_may_be_missing(tmp_path: Path) -> None:
+    source = of_variant("without_line_breaks_2.msh", tmp_path)
+    files_gmsh.packed_2(tmp_path / "with", together=40)
+    np.testing.assert_equal(tables(source), tables(parsed((tmp_path / "with").read_bytes())))
+
+
 @pytest.mark.parametrize("model", ["groups", "partitioned", "views"])
 @pytest.mark.parametrize("version", [2, 4])
 def test_text_and_binary_files_hold_the_same(model: str, version: int, tmp_path: Path) -> None:
@@ -83,7 +126,8 @@ def test_both_byte_orders_hold_the_same(maker: Callable[..., None], count: int, 
 
 
 @pytest.mark.parametrize(
-    "variant", ["groups_text_2.msh", "groups_binary_4.msh", "sparse_text_2.msh", "sparse_binary_4.msh"]
+    "variant",
+    ["all_text_1.msh", "groups_text_2.msh", "groups_binary_4.msh", "sparse_text_2.msh", "sparse_binary_4.msh"],
 )
 def test_points_and_elements_are_those_that_gmsh_reads(variant: str, tmp_path: Path) -> None:
     source = of_variant(variant, tmp_path)
@@ -399,7 +443,12 @@ def test_versions(version: str) -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"$NOD\n1\n1 0 0 0\n$ENDNOD\n$EndNOD\n", "has no .MeshFormat"),
+        (text_1()[: text_1().index(b"$ELM")], r"there are no \$Elements in it"),
+        (text_1().replace(b"$ELM\n4", b"$ELM\n5"), "announces 5 elements and holds 4"),
+        (text_1().replace(b"$ELM\n4", b"$ELM\n3"), "announces 3 elements and holds more"),
+        (text_1().replace(b"2 2 7 1 3 2 3 5", b"2 2 7 1 2 3 5"), "the element 2 has not 3 nodes"),
+        (text_1().replace(b"2 2 7 1 3 2", b"2 2 7 1 -3 2"), "announces 4 elements and holds 1"),
+        (text_1().replace(b"$NOD\n5", b"$NOD\n6"), "line 8: '.ENDNOD' is not an integer"),
         (b"(0 a mesh of another program)\n", "has no .MeshFormat"),
         (text_2().replace(b"2.2 0", b"two 0"), "does not tell a version"),
         (text_2().replace(b"2.2 0", b"2.2 1"), "does not tell the order of the bytes"),
@@ -432,6 +481,7 @@ def test_damaged_files(data: bytes, message: str) -> None:
 @pytest.mark.parametrize(
     "variant",
     [
+        "groups_text_1.msh",
         "groups_text_2.msh",
         "partitioned_binary_2.msh",
         "one_by_one_2.msh",
@@ -445,7 +495,8 @@ def test_damaged_files(data: bytes, message: str) -> None:
 def test_truncated_files(variant: str, tmp_path: Path) -> None:
     of_variant(variant, tmp_path)
     data = (tmp_path / variant).read_bytes()
-    end = data.index(b"$EndElements") + len(b"$EndElements") - 1
+    last = b"$ENDELM" if variant.endswith("_1.msh") else b"$EndElements"
+    end = data.index(last) + len(last) - 1
     for cut in {*np.linspace(0, end, 80).astype(int).tolist(), *range(end - 20, end + 1), *range(0, 120, 7)}:
         with pytest.raises(ReadError):
             gmsh.parse(data[:cut])

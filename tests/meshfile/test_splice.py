@@ -31,8 +31,8 @@ def spatial(points: np.ndarray) -> np.ndarray:
 
 
 def in_order(variant: str, *points: np.ndarray) -> list[np.ndarray]:
-    """The points as they are, but those of gmsh 2.2, which gmsh reads in an order of its own: these are sorted."""
-    return [p[np.lexsort(p.T)] for p in points] if variant.endswith("_2.msh") else list(points)
+    """The points as they are; those of gmsh 1 and 2.2, which gmsh reads in an order of its own, are sorted."""
+    return [p[np.lexsort(p.T)] for p in points] if variant.endswith(("_1.msh", "_2.msh")) else list(points)
 
 
 def test_the_table_is_long_enough() -> None:

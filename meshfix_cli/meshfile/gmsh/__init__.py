@@ -1,4 +1,4 @@
-"""Files of gmsh, .msh: versions 2.0 to 2.2 and 4.1, in text and binary.
+"""Files of gmsh, .msh: versions 1, 2.0 to 2.2 and 4.1, in text and, but for the first, binary.
 
 Source: "Gmsh Reference Manual", chapter "Gmsh file formats", and there "Legacy formats".
 """
@@ -72,7 +72,7 @@ def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
     ]
     by_corner = "section $ElementNodeData" in file.untold
     layout = InPlace(data, coordinates, [_refuse if by_corner else block.corners for block in file.blocks])
-    load, regions = partial(_load, file, tags, cells, labels), _regions(cells, labels)
+    load, regions = partial(_load, file, tags, cells, labels), _regions(file, cells, labels)
     for what, numbers in (("nodes", tags), ("elements", _ids(cells))):
         if not np.array_equal(numbers, np.arange(1, len(numbers) + 1)):
             file.untold[f"numbers of {what}"] = None
@@ -147,10 +147,10 @@ def _ids(cells: Sequence[Cells]) -> Int64:
     return np.concatenate([np.empty(0, dtype=np.int64), *(run.ids for run in cells if run.ids is not None)])
 
 
-def _regions(cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
-    """The array of groups, if an element that is solved for is in one."""
-    name = _SETS if _SETS in labels else PHYSICAL
-    return (name,) if name in labels and any(labels[name][i].any() for i in solved_runs(cells)) else ()
+def _regions(file: File, cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
+    """The array of groups, if an element that is solved for is in one; in version 1 entities are as good as groups."""
+    names = (_SETS if _SETS in labels else PHYSICAL, *((_ENTITY,) if file.first else ()))
+    return tuple(name for name in names if name in labels and any(labels[name][i].any() for i in solved_runs(cells)))
 
 
 def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, list[Int64]]) -> Arrays:

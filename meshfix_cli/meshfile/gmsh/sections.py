@@ -17,11 +17,11 @@ from meshfix_cli.meshfile.gmsh.cells import TYPES
 from meshfix_cli.meshfile.gmsh.numbers import Binary, Int64, Text
 from meshfix_cli.meshfile.splice import Places
 
-_SECTION = re.compile(rb"^\$(?!End)(\w{0,60})[^\n]*(?:\n|\Z)", re.MULTILINE)
-_END = re.compile(rb"\s*\$End(\w+)")
+_SECTION = re.compile(rb"^\$(?!End|END)(\w{0,60})[^\n]*(?:\n|\Z)", re.MULTILINE)
+_END = re.compile(rb"\s*\$(?:End|END)(\w+)")
 _FORMAT = re.compile(rb"\s*(\d+(?:\.\d+)?)[ \t]+([01])[ \t]+(\d+)[^\n]*\n")
 _NAME = re.compile(rb'^\s*(\d)\s+(-?\d{1,18})\s+"([^\n]*)"', re.MULTILINE)
-_TOLD = ("MeshFormat", "PhysicalNames", "Nodes", "Elements", "NodeData", "ElementData")
+_TOLD = ("MeshFormat", "PhysicalNames", "Nodes", "Elements", "NodeData", "ElementData", "NOD", "NOE", "ELM")
 Numbers = Text | Binary
 _Readers = Mapping[str, Callable[[Any, "File"], None]]
 
@@ -76,6 +76,8 @@ class File:
         What no other format holds.
     parametric : bool
         Whether nodes have parameters of the curve or face on which they lie.
+    first : bool
+        Whether it is of version 1.
     """
 
     tags: list[Int64] = field(default_factory=list)
@@ -89,6 +91,7 @@ class File:
     views: list[tuple[str, Numbers]] = field(default_factory=list)
     untold: dict[str, None] = field(default_factory=dict)
     parametric: bool = False
+    first: bool = False
 
     def ghosts(self, block: Block) -> NDArray[np.bool_] | None:
         """Mark all elements (m,) of a block that belongs to another partition."""
@@ -113,12 +116,14 @@ def read(data: bytes) -> File:
         name, at = match[1].decode("latin-1"), match.end()
         if name not in _TOLD:
             file.untold["comments" if name == "Comments" else f"section ${name}"] = None
+        if numbers is None and name in _READERS[1]:
+            numbers, readers, file.first = Text(data, at), _READERS[1], True
         if name in readers and numbers is not None:
             numbers.at = at
             readers[name](numbers, file)
             at = _behind(data, numbers.at, name)
             continue
-        begin, at = at, data.find(b"\n$End" + match[1], at - 1)
+        begin, at = at, _end_of(data, match[1], at)
         if at < 0 and numbers is None and name not in ("MeshFormat", "Comments"):
             break
         if at < 0:
@@ -135,10 +140,20 @@ def read(data: bytes) -> File:
         at += 1
     _leave_out_interfaces(file)
     if numbers is None:
-        raise ReadError(
-            "is not a readable gmsh file: it has no $MeshFormat, as those of version 1; save it as 2.2 or 4.1"
-        )
+        raise ReadError("is not a readable gmsh file: it has no $MeshFormat, and no $NOD as those of version 1")
     return file
+
+
+def _end_of(data: bytes, name: bytes, at: int) -> int:
+    """Return where a section ends that stands at an offset: some programs put no line break behind binary numbers.
+
+    -1: it does not end.
+    """
+    for end in (b"\n$End", b"\n$END", b"$End"):
+        found = data.find(end + name, at - 1)
+        if found >= 0:
+            return found
+    return -1
 
 
 def _leave_out_interfaces(file: File) -> None:
@@ -226,7 +241,7 @@ def _elements_2(numbers: Numbers, file: File) -> None:
     if numbers.binary:
         numbers.at += 4 * used
     elif used < len(flat):
-        raise ReadError(f"is not a readable gmsh file: $Elements announces {_elements(count)} and holds more")
+        raise _too_many(count)
     kinds = flat[heads + 1 - own]
     for kind in dict.fromkeys(kinds.tolist()):
         begin, size = heads[kinds == kind], _nodes_of(kind)
@@ -244,6 +259,37 @@ def _elements_2(numbers: Numbers, file: File) -> None:
         )
         corners = partial(numbers.corners, base, first, size, "i4")
         file.blocks.append(Block(kind, ids, nodes, entities, physical, -1, corners))
+
+
+def _elements_1(numbers: Numbers, file: File) -> None:
+    """Read rows of tag, type, physical group, entity, number of nodes and nodes."""
+    count = numbers.count()
+    base, flat = numbers.at, numbers.all_integers()
+    heads = _heads_1(flat, count)
+    kinds = flat[heads + 1]
+    for kind in dict.fromkeys(kinds.tolist()):
+        begin, size = heads[kinds == kind], _nodes_of(kind)
+        ids, _, physical, entities, sizes = (flat[begin + i].astype(np.int64) for i in range(5))
+        if (sizes != size).any():
+            element = ids[sizes != size][0]
+            raise ReadError(f"is not a readable gmsh file: the element {element} has not {size} nodes")
+        nodes = flat[begin[:, None] + 5 + np.arange(size)].astype(np.int64)
+        corners = partial(numbers.corners, base, begin + 5, size, "i4")
+        file.blocks.append(Block(kind, ids, nodes, entities, physical, -1, corners))
+
+
+def _heads_1(flat: NDArray[Any], count: int) -> Int64:
+    """Where the rows of elements stand, of which each tells how many nodes it has."""
+    numbers, at = flat.astype(flat.dtype.newbyteorder("=")).data, 0
+    heads: list[int] = []
+    while len(heads) < count:
+        if at + 5 > len(numbers) or not 0 < numbers[at + 4] <= len(numbers) - at - 5:
+            raise _too_few(count, count - len(heads))
+        heads.append(at)
+        at += 5 + numbers[at + 4]
+    if at < len(numbers):
+        raise _too_many(count)
+    return np.array(heads, dtype=np.int64)
 
 
 def _heads(flat: NDArray[Any], count: int, binary: bool) -> tuple[Int64, int]:
@@ -265,6 +311,10 @@ def _heads(flat: NDArray[Any], count: int, binary: bool) -> tuple[Int64, int]:
 
 def _too_few(count: int, left: int) -> ReadError:
     return ReadError(f"is truncated: $Elements announces {_elements(count)} and holds {count - left:,}")
+
+
+def _too_many(count: int) -> ReadError:
+    return ReadError(f"is not a readable gmsh file: $Elements announces {_elements(count)} and holds more")
 
 
 def _elements(count: int) -> str:
@@ -304,6 +354,7 @@ def _entities(numbers: Numbers, file: File, partitioned: bool) -> None:
 
 
 _READERS: dict[int, _Readers] = {
+    1: {"NOD": _nodes_2, "NOE": _nodes_2, "Nodes": _nodes_2, "ELM": _elements_1, "Elements": _elements_1},
     2: {"Nodes": _nodes_2, "ParametricNodes": _parametric_nodes_2, "Elements": _elements_2},
     4: {
         "Nodes": _nodes_4,

@@ -45,8 +45,6 @@ def misread(data: bytes, form: Format) -> str | None:
 
     Several meshes in one file are laid over one another.
     """
-    if form.name == "off":
-        return without_counts(data.partition(b"\n")[2]) or _several(data, form)
     if form.name == "nastran" and re.search(rb"BEGIN BULK", data) and not _BULK.search(data):
         return "is truncated: it ends with BEGIN BULK"
     if form.name == "dolfin-xml" and (why := _fewer(data)):
@@ -92,7 +90,6 @@ _ONCE = {
     "mdpa": [("blocks of nodes", rb"(?m)^\s*Begin\s+Nodes\b")],
     "nastran": [("bulk data sections", rb"(?mi)^\s*BEGIN\s+(?:BULK|SUPER)\b")],
     "netgen": [("meshes", rb"(?m)^\s*points\s*$")],
-    "off": [("meshes", rb"(?m)^\s*(?:ST)?C?N?4?n?OFF\b")],
     "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],
     "su2": [("zones", rb"(?m)^\s*(?:NZONE\s*=\s*(?:[2-9]|1\d)|IZONE\s*=)"), ("zones", rb"(?m)^\s*NPOIN\s*=")],
 }

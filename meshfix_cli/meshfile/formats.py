@@ -160,6 +160,10 @@ def _cgns(data: bytes, text: str) -> Format | None:
     return Format("cgns") if old else _in_hdf5(b"CGNSLibraryVersion", "cgns")(data, text)
 
 
+def _off(_: bytes, text: str) -> Format | None:
+    return Format("off") if re.match(r"(?:#[^\n]*\n\s*)*(?:ST)?C?N?4?n?OFF(?![A-Za-z])", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -236,6 +240,10 @@ OWN = {
         "families of zones and cells; boundary conditions, which are held, and sections", "`h5py`",
     ),
     "su2": Own("su2", _su2, {".su2": "su2"}, "SU2", "zones, markers, boxes of deformation", "zones; markers"),
+    "off": Own(
+        "off", _off, {".off": "off"}, "Geomview",
+        "all keywords and dialects in text; colours, normals and texture coordinates stay", "none",
+    ),
 }  # fmt: skip
 
 
@@ -257,9 +265,7 @@ def _of_meshio(text: str) -> Format | None:
         return Format("dolfin-xml") if "<dolfin" in text else None
     if text.startswith("* FLAC3D"):
         return Format("flac3d")
-    if _UCD.match(text):
-        return Format("avsucd")
-    return Format("off") if re.match(r"(?:ST)?(?:C)?(?:N)?OFF\b", text) else None
+    return Format("avsucd") if _UCD.match(text) else None
 
 
 def by_name(path: Path) -> Format | None:

@@ -75,6 +75,54 @@ class Lines(NamedTuple):
         """Return the integers (k, last - first) that stand there."""
         return integers_at(self.text, self.columns(first, last, rows))
 
+    def place(self, row: int) -> int:
+        """Return where a line begins."""
+        return int(self.spans[self.starts[row], 0])
+
+
+class Rows(NamedTuple):
+    """What stands for `Lines` where all are of as many integers: they are read at once, and found when asked for.
+
+    Attributes
+    ----------
+    text : bytes
+    begin, end : int
+        Where to look for the first word, and the offset behind the last.
+    values : (n, k) int64
+    """
+
+    text: bytes
+    begin: int
+    end: int
+    values: Int64
+
+    @classmethod
+    def of(cls, text: bytes, at: int, count: int, columns: int, column: int) -> Rows | None:
+        """Read the next integers; None: there are not as many, or those in a column are not all the same."""
+        if not 0 < count * columns <= len(text) - at:
+            return None
+        values, end, bad = kernels.scan_integers(text, at, count * columns)
+        table = values.astype(np.int64, copy=False).reshape(count, columns) if bad < 0 else np.empty((0, columns))
+        alike = len(table) and (table[:, column] == table[0, column]).all()
+        return cls(text, at, end, table) if alike else None
+
+    @property
+    def counts(self) -> Int64:
+        """(n,) int64: how many words a row has."""
+        return np.full(len(self.values), self.values.shape[1])
+
+    def columns(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Spans:
+        """Return the spans (k, last - first, 2) of some words of some rows."""
+        return words(self.text, self.begin, self.values.size).reshape(*self.values.shape, 2)[rows, first:last]
+
+    def integers(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Int64:
+        """Return the integers (k, last - first) that stand there."""
+        return self.values[rows, first:last]
+
+    def place(self, row: int) -> int:
+        """Return where a row begins."""
+        return int(words(self.text, self.begin, row * self.values.shape[1] + 1)[-1, 0])
+
 
 def lines(text: bytes, at: int, count: int, what: str = "line") -> Lines:
     """Find the words of the next lines that have some.
@@ -96,6 +144,11 @@ def rows(text: bytes, at: int, count: int, columns: int) -> tuple[Spans, int]:
         raise ReadError(f"is truncated: {counted(count, 'row is', 'rows are')} announced")
     spans = words(text, at, count * columns)
     return spans.reshape(count, columns, 2), int(spans[-1, 1]) if len(spans) else at
+
+
+def within(text: bytes, begin: int, end: int) -> Spans:
+    """Find all words (k, 2) that stand between two offsets."""
+    return kernels.find_words(text[begin:end], 0, max(end - begin, 0)) + begin
 
 
 class Numbering:

@@ -289,13 +289,13 @@ def test_double_needs_a_format_that_has_it(tmp_path: Path) -> None:
 
 
 def test_what_meshio_would_write_anew_is_not_replaced_without_a_backup(tmp_path: Path) -> None:
-    path = tmp_path / "in.off"
+    path = tmp_path / "in.post"
     meshio.read(TANGLED).write(path)
     original = path.read_bytes()
     assert "name another OUTPUT, or use --backup" in error_line("untangle", path, path)
     assert path.read_bytes() == original
-    assert "note: written anew as off by meshio" in run("untangle", "--backup", path, path).stdout.decode()
-    assert (tmp_path / "in.off.bak").read_bytes() == original
+    assert "note: written anew as permas by meshio" in run("untangle", "--backup", path, path).stdout.decode()
+    assert (tmp_path / "in.post.bak").read_bytes() == original
 
 
 def test_requirements_where_the_repair_happens(tmp_path: Path) -> None:

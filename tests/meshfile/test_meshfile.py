@@ -444,7 +444,7 @@ def test_new_file_obeys_the_umask(tmp_path: Path, plate: Mesh) -> None:
 def test_a_failed_write_leaves_the_original(
     tmp_path: Path, plate: Mesh, fault: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = save(tmp_path / "in.off", plate)
+    path = save(tmp_path / "in.post", plate)
     original = path.read_bytes()
     document = read(path)
 
@@ -453,11 +453,11 @@ def test_a_failed_write_leaves_the_original(
 
     monkeypatch.setattr(meshio, "write", broken)
     with pytest.raises(
-        WriteError, match="No space left" if fault == "disk" else r"cannot be written as off \(it does not take"
+        WriteError, match="No space left" if fault == "disk" else r"cannot be written as permas \(it does not take"
     ):
         write(document, tangle(document.mesh), path)
     assert path.read_bytes() == original
-    assert [p.name for p in tmp_path.iterdir()] == ["in.off"]
+    assert [p.name for p in tmp_path.iterdir()] == ["in.post"]
 
 
 def test_errors_carry_the_name_of_the_file(tmp_path: Path) -> None:

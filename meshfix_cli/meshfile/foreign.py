@@ -1,8 +1,7 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
-Source: "MFEM mesh formats"; FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user
-documentation, "Build a mesh"; SEACAS, "exotxt"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide";
-Kratos wiki.
+Source: FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user
+documentation, "Build a mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide"; Kratos wiki.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ MOST_BYTES = 65536  # of a data set that may be texts
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
 # How a file begins, and where its extension must help to tell.
 _FOREIGN = (
-    ("MFEM", r"MFEM (?:NURBS |NC )?mesh v|MFEM INLINE mesh", ""),
     ("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),
     ("Ansys Fluent", r"\(\s*\d+\s+[\"(\d]", ""),
     ("LS-DYNA", r"(?:\$[^\n]*\n\s*)*\*(?:KEYWORD|NODE[\s_%](?s:.*)\*ELEMENT_|PART\s|ELEMENT_)", ""),

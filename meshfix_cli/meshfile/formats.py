@@ -164,6 +164,10 @@ def _off(_: bytes, text: str) -> Format | None:
     return Format("off") if re.match(r"(?:#[^\n]*\n\s*)*(?:ST)?C?N?4?n?OFF(?![A-Za-z])", text) else None
 
 
+def _mfem(_: bytes, text: str) -> Format | None:
+    return Format("mfem") if re.match(r"MFEM (?:\w+ )?mesh v", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -244,6 +248,11 @@ OWN = {
         "off", _off, {".off": "off"}, "Geomview",
         "all keywords and dialects in text; colours, normals and texture coordinates stay", "none",
     ),
+    "mfem": Own(
+        "mfem", _mfem, {".mesh": "mfem"}, "MFEM",
+        "versions 1.0, 1.2 and 1.3, also with nodes of first order; no NURBS, nonconforming or curved meshes",
+        "attributes; their sets, and those of the boundary",
+    ),
 }  # fmt: skip
 
 
@@ -278,6 +287,11 @@ def by_name(path: Path) -> Format | None:
 
     names = [name for name in meshio.extension_to_filetypes.get(suffix, []) if name not in ENDLESS]
     return Format(names[0]) if names else None
+
+
+def may_be(form: Format, path: Path) -> bool:
+    """Whether a file of a format may have such an extension, though others may have it as well."""
+    return form.reader in OWN and inner(path).suffix.lower() in OWN[form.reader].extensions
 
 
 def writers() -> tuple[str, ...]:

@@ -204,8 +204,8 @@ def check_output(document: Document, target: str, form: Format) -> None:
 def output_format(document: Document, target: str, name: str | None = None) -> Format:
     """Return the format of the output: the one named, else that of the target's extension, else the input's.
 
-    A target that is the input keeps its format, and one with an extension that is not known has it. A mesh that was
-    read in parts is written so where its format stays.
+    A target that is the input keeps its format, and one with an extension that is not known, or that several formats
+    have, has it. A mesh that was read in parts is written so where its format stays.
 
     Raises
     ------
@@ -219,7 +219,7 @@ def output_format(document: Document, target: str, name: str | None = None) -> F
         return document.format
     if name is not None:
         form = Format(name)
-    elif target == "-" or document.is_file(target):
+    elif target == "-" or document.is_file(target) or formats.may_be(document.format, Path(target)):
         form = document.format
     else:
         form = formats.by_name(Path(target)) or document.format

@@ -16,8 +16,6 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.document import Document
 
 FOREIGN = {
-    "a.mesh": ("MFEM mesh v1.2\n\ndimension\n2\n", "MFEM"),
-    "b.mesh": ("MFEM NURBS mesh v1.0\n", "MFEM"),
     "c.mesh": ("% GETFEM MESH FILE \n% GETFEM VERSION 5.0\n\nBEGIN POINTS LIST\n", "GetFEM"),
     "d.msh": ('(0 "made by a mesher")\n(2 3)\n(10 (0 1 8 0))\n', "Ansys Fluent"),
     "e.cas": ("(2 2)\n", "Ansys Fluent"),

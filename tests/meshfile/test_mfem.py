@@ -1,0 +1,235 @@
+"""MFEM's meshes: attributes and sets, the orders of its elements, and coordinates that are a grid function."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from elements import MESHES
+from files_medit import surface
+from files_mfem import CORNERS, FILES, nodes, text
+from shapes import block, plate
+
+from meshfix_cli import read, untangle, write
+from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile import formats
+from meshfix_cli.meshfile.mfem import parse
+
+SMALL = b"""MFEM mesh v1.3
+
+dimension
+2
+
+elements
+3
+7 2 0 1 4
+7 3 1 2 3 4
+9 2 0 4 3
+
+attribute_sets
+2
+"left" 1 9
+"all of it" 2 7 9
+
+boundary
+2
+1 1 0 1
+4 1 1 2
+
+bdr_attribute_sets
+1
+"wall" 2 4 5
+
+vertices
+5
+2
+0 0
+2 0
+2 2
+0 2
+0.5 1
+"""
+NUMBERS = {"triangle": 2, "quad": 3, "tetra": 4, "hexahedron": 5, "wedge": 6, "pyramid": 7}
+# The corners of each reference element, by hand from MFEM's list of its geometries.
+REFERENCE = {
+    "quad": [[0, 0], [1, 0], [1, 1], [0, 1]],
+    "hexahedron": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]],
+    "wedge": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]],
+    "pyramid": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1]],
+    "tetra": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "triangle": [[0, 0], [1, 0], [0, 1]],
+}
+
+
+def test_elements_keep_their_places_attributes_and_sets() -> None:
+    source = parse(SMALL)
+    assert [(run.type, None if run.ids is None else run.ids.tolist()) for run in source.cells] == [
+        ("triangle", [0]), ("quad", [1]), ("triangle", [2]), ("line", None),
+    ]  # fmt: skip
+    arrays = source.arrays
+    assert [runs.tolist() for runs in arrays.cell["mfem:attribute"]] == [[7], [7], [9], [1, 4]]
+    sets = {name: [rows.tolist() for rows in runs] for name, runs in arrays.cell_sets.items()}
+    assert sets == {
+        "left": [[], [], [0], []], "all of it": [[0], [0], [0], []], "boundary 1": [[], [], [], [0]],
+        "boundary 4": [[], [], [], [1]], "wall": [[], [], [], [1]],
+    }  # fmt: skip
+    assert source.regions == ("mfem:attribute",)
+
+
+def test_attributes_hold_the_interface_between_them(tmp_path: Path) -> None:
+    (tmp_path / "in.mesh").write_bytes(SMALL)
+    document = read(tmp_path / "in.mesh")
+    assert document.format.name == "mfem"
+    assert document.fixed["between regions of mfem:attribute"] == 1
+    assert document.ids.tolist() == [0, 2, 1] or document.ids.tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("key", REFERENCE)
+def test_the_reference_elements_are_valid(key: str, tmp_path: Path) -> None:
+    corners = REFERENCE[key]
+    d = len(corners[0])
+    rows = "\n".join(" ".join(map(str, row)) for row in corners)
+    (tmp_path / "in.mesh").write_text(
+        f"MFEM mesh v1.0\ndimension\n{d}\nelements\n1\n1 {NUMBERS[key]} {' '.join(map(str, range(len(corners))))}\n"
+        f"boundary\n0\nvertices\n{len(corners)}\n{d}\n{rows}\n"
+    )
+    document = read(tmp_path / "in.mesh")
+    assert [part.key for part in document.parts] == [key]
+    assert not document.mesh.topology.flipped.any()
+    assert document.mesh.check()[0] == 0
+
+
+def test_elements_of_every_type(tmp_path: Path) -> None:
+    points, cells = MESHES["every solid"]()
+    rows = [f"1 {NUMBERS[key]} {' '.join(map(str, row))}" for key, some in cells for row in some.tolist()]
+    (tmp_path / "in.mesh").write_text(
+        f"MFEM mesh v1.0\ndimension\n3\nelements\n{len(rows)}\n{chr(10).join(rows)}\nboundary\n0\n"
+        f"vertices\n{len(points)}\n3\n" + "".join(f"{x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
+    )
+    document = read(tmp_path / "in.mesh")
+    found = {(part.key, tuple(row)) for part in document.parts for row in part.vertices.tolist()}
+    assert found == {(key, tuple(row)) for key, some in cells for row in some.tolist()}
+    assert document.mesh.check()[0] == 0
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("collection", ["H1_3D_P1", "Linear", "H1Pos_3D_P1", "H1@G_3D_P1"])
+def test_nodes_of_first_order_are_the_coordinates(order: int, collection: str) -> None:
+    points, cells = block()
+    source = parse(text(points, cells, nodes(points, order, collection)).encode())
+    np.testing.assert_array_equal(source.points, points)
+    np.testing.assert_array_equal(source.cells[0].vertices, cells)
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_elements_with_nodes_of_their_own_are_solved_as_one_mesh_where_points_are_joined(
+    order: int, tmp_path: Path
+) -> None:
+    """As in periodic meshes."""
+    points, cells = plate()
+    own = nodes(points[cells].reshape(-1, 3)[:, :2], order, "L2_T1_2D_P1")
+    (tmp_path / "in.mesh").write_text(text(points, cells, own))
+    (tmp_path / "plain.mesh").write_text(text(points, cells))
+    document, plain = read(tmp_path / "in.mesh", join_points=True), read(tmp_path / "plain.mesh")
+    assert document.mesh.check()[0] == plain.mesh.check()[0] > 0
+    assert document.mesh.movable.sum() == plain.mesh.movable.sum()
+    outcome = untangle(document.mesh)
+    assert outcome.valid
+    write(document, outcome.after, tmp_path / "out.mesh")
+    assert read(tmp_path / "out.mesh").mesh.check()[0] == 0
+    assert (tmp_path / "out.mesh").read_text().split("VDim")[0] == (tmp_path / "in.mesh").read_text().split("VDim")[0]
+    with pytest.raises(ReadError, match="nodes of its own for each element"):
+        document.source.layout.rewritten(  # type: ignore[union-attr]
+            document.source.points,
+            document.source.points,
+            {0: (np.array([0]), (1, 0, 2))},  # type: ignore[dict-item]
+        )
+
+
+def test_nodes_of_quadrilaterals_and_hexahedra_run_by_coordinates() -> None:
+    for kind, d, order in (("3", 2, [0, 1, 3, 2]), ("5", 3, [0, 1, 3, 2, 4, 5, 7, 6])):
+        corners = [[i & 1, i >> 1 & 1, i >> 2][:d] for i in range(2**d)]
+        values = "\n".join(" ".join(map(str, row)) for row in corners)
+        source = parse(
+            f"MFEM mesh v1.0\ndimension\n{d}\nelements\n1\n1 {kind} {' '.join(map(str, range(2**d)))}\nboundary\n0\n"
+            f"vertices\n{2**d}\nnodes\nFiniteElementSpace\nFiniteElementCollection: L2_T1_{d}D_P1\nVDim: {d}\n"
+            f"Ordering: 1\n{values}\n".encode()
+        )
+        assert source.cells[0].vertices.tolist() == [order]
+
+
+def test_the_boundary_of_elements_with_nodes_of_their_own_is_held() -> None:
+    points, cells = plate()
+    source = parse(text(points, cells, nodes(points[cells].reshape(-1, 3)[:, :2], 1, "L2_T1_2D_P1")).encode())
+    assert source.held is not None
+    np.testing.assert_array_equal(source.held.reshape(-1, 3), np.isin(cells, surface(cells)))
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"MFEM NURBS mesh v1.0\n", "is a NURBS mesh of MFEM"),
+        (b"MFEM NC mesh v1.0\n", r"is a nonconforming mesh \(NC\) of MFEM"),
+        (b"MFEM mesh v1.1\n", r"is a nonconforming mesh \(NC\) of MFEM"),
+        (b"MFEM INLINE mesh v1.0\n\ntype = quad\nnx = 4\n", r"is a mesh that is to be made \(INLINE\) of MFEM"),
+        (SMALL.replace(b"v1.3", b"v1.4"), "is of MFEM's version 1.4"),
+        (SMALL + b"\nvertex_parents\n0\n", r"is a nonconforming mesh \(NC\)"),
+        (text(*block(), nodes(block()[0], 1, "H1_3D_P3")).encode(), r"has curved elements \(nodes of order 3\)"),
+        (text(*block(), nodes(block()[0], 1, "Quadratic")).encode(), r"has curved elements \(nodes of order 2\)"),
+        (text(*block(), nodes(block()[0], 1, "L2_T4_3D_P4")).encode(), r"has curved elements \(nodes of order 4\)"),
+        (text(*block(), nodes(block()[0], 1, "L2_3D_P1")).encode(), "has nodes in the space L2_3D_P1"),
+        (text(*block(), nodes(block()[0][:-1], 1, "H1_3D_P1")).encode(), "is truncated"),
+    ],
+)
+def test_what_is_not_read_is_named(data: bytes, words: str) -> None:
+    with pytest.raises(ReadError, match=words):
+        parse(data)
+    assert formats.sniff(data) == formats.Format("mfem")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        (b"elements\n3", b"elements\n9", "line 19: there are more numbers than announced"),
+        (b"elements\n3", b"elements\n99999999999999999999", "is not an integer|announced"),
+        (b"elements\n3", b"elements\n2", "line 10: there are more numbers than announced"),
+        (b"7 3 1 2 3 4", b"7 8 1 2 3 4", "line 9: elements of the type 8 are not known"),
+        (b"7 3 1 2 3 4", b"7 3 1 2 3", "line 9: there are not 6 numbers"),
+        (b"7 3 1 2 3 4", b"7 3 1 2 3 5", "the cell 1 names the point 5"),
+        (b"vertices\n5\n2", b"vertices\n5\n4", "vertices have 4 coordinates"),
+        (b"vertices\n5\n2", b"vertices\n6\n2", "truncated"),
+        (b"vertices\n5\n2", b"vertices\n4\n2", "the cell 0 names the point 4|more numbers than announced"),
+        (b"0.5 1", b"0.5 x", "line 33: 'x' is not a number"),
+        (b"attribute_sets\n2", b"attribute_sets\n3", "line 15: there are fewer sets of attributes"),
+        (b"boundary\n2", b"borders\n2", "line 17: 'borders' is not known"),
+    ],
+)
+def test_what_is_wrong_is_named(before: bytes, after: bytes, words: str) -> None:
+    assert before in SMALL
+    with pytest.raises(ReadError, match=words):
+        parse(SMALL.replace(before, after, 1))
+
+
+def test_an_output_of_the_same_extension_has_the_format_of_the_input(tmp_path: Path) -> None:
+    FILES["plane.mesh"](tmp_path / "in.mesh")
+    document = read(tmp_path / "in.mesh")
+    write(document, document.mesh, tmp_path / "out.mesh")
+    assert (tmp_path / "out.mesh").read_bytes() == (tmp_path / "in.mesh").read_bytes()
+    write(document, document.mesh, tmp_path / "out.vtk")
+    assert read(tmp_path / "out.vtk").mesh.check() == document.mesh.check()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_truncated(name: str, tmp_path: Path) -> None:
+    FILES[name](tmp_path / name)
+    data = (tmp_path / name).read_bytes()
+    end = data.rindex(b"\nmfem_") if b"\nmfem_" in data else len(data)
+    for cut in range(0, data.rstrip().rindex(b"\n", 0, end - 2), max(1, end // 60)):
+        with pytest.raises(ReadError):
+            parse(data[:cut])
+
+
+def test_corners_of_all_types() -> None:
+    """The table of the tests' own reader is that of MFEM's numbers."""
+    assert [len(REFERENCE[key]) for key in NUMBERS] == CORNERS[2:]

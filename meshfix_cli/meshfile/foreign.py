@@ -1,7 +1,7 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
 Source: FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user
-documentation, "Build a mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide"; Kratos wiki.
+documentation, "Build a mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide".
 """
 
 from __future__ import annotations
@@ -49,8 +49,6 @@ def misread(data: bytes, form: Format) -> str | None:
         return why
     if form.name == "permas" and b"$FIN" not in data:
         return "is truncated: it does not end with $FIN"
-    if form.name == "mdpa" and len(re.findall(rb"(?m)^\s*Begin ", data)) != len(re.findall(rb"(?m)^\s*End ", data)):
-        return "is truncated: a block does not end"
     return _several(data, form)
 
 
@@ -85,7 +83,6 @@ def _several(data: bytes, form: Format) -> str | None:
 _ONCE = {
     "avsucd": [("meshes", rb"(?m)^\s*(?:\d+[ \t]+){4}\d+\s*\n\s*\d+(?:[ \t]+[-+.\d]\S*){3}\s*\n")],
     "dolfin-xml": [("meshes", rb"<mesh\b")],
-    "mdpa": [("blocks of nodes", rb"(?m)^\s*Begin\s+Nodes\b")],
     "nastran": [("bulk data sections", rb"(?mi)^\s*BEGIN\s+(?:BULK|SUPER)\b")],
     "netgen": [("meshes", rb"(?m)^\s*points\s*$")],
     "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],

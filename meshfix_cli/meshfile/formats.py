@@ -168,6 +168,10 @@ def _mfem(_: bytes, text: str) -> Format | None:
     return Format("mfem") if re.match(r"MFEM (?:\w+ )?mesh v", text) else None
 
 
+def _mdpa(_: bytes, text: str) -> Format | None:
+    return Format("mdpa") if re.match(r"(?://[^\n]*\n\s*)*Begin[ \t]+[A-Z]\w+", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -252,6 +256,11 @@ OWN = {
         "mfem", _mfem, {".mesh": "mfem"}, "MFEM",
         "versions 1.0, 1.2 and 1.3, also with nodes of first order; no NURBS, nonconforming or curved meshes",
         "attributes; their sets, and those of the boundary",
+    ),
+    "mdpa": Own(
+        "mdpa", _mdpa, {".mdpa": "mdpa"}, "Kratos",
+        "elements, conditions and geometries, whose names tell what they are; data stay",
+        "properties; parts of the model, also in parts",
     ),
 }  # fmt: skip
 

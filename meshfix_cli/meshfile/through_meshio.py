@@ -15,7 +15,6 @@ from typing import Any
 
 import meshio
 import numpy as np
-from meshio.mdpa._mdpa import _mdpa_to_meshio_type
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
@@ -49,7 +48,6 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
             return read(data, form, path)
     with _sentences(ReadError, f"is not a readable {form.name} file", path):
         _refuse(foreign.misread(data, form))
-        _refuse(_unknown_elements(data) if form.name == "mdpa" else None)
         _refuse(_several_zones(path) if form.name == "cgns" else None)
         mesh = meshio.read(path, file_format=form.reader)
         _refuse(foreign.missing_cells(data, form, sum(len(block.data) for block in mesh.cells)))
@@ -77,13 +75,6 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
     if form.name == "abaqus":
         names = rb"(?<=TYPE=)\w+(?=\n)"
         path.write_bytes(re.sub(names, lambda name: _PLAIN.get(name[0], name[0]), path.read_bytes()))
-
-
-def _unknown_elements(data: bytes) -> str | None:
-    """Name elements of Kratos that meshio does not know, and takes for others with as many nodes."""
-    names = re.findall(rb"(?m)^\s*Begin\s+(?:Elements|Conditions)\s+(\w+)", data)
-    unknown = [name.decode() for name in names if name.decode() not in _mdpa_to_meshio_type]
-    return f"has elements called {unknown[0]}, which are not known" if unknown else None
 
 
 def _several_zones(path: Path) -> str | None:

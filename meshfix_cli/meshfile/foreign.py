@@ -1,7 +1,7 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
-Source: FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user
-documentation, "Build a mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide".
+Source: FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user documentation, "Build a
+mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide".
 """
 
 from __future__ import annotations
@@ -45,8 +45,6 @@ def misread(data: bytes, form: Format) -> str | None:
     """
     if form.name == "nastran" and re.search(rb"BEGIN BULK", data) and not _BULK.search(data):
         return "is truncated: it ends with BEGIN BULK"
-    if form.name == "dolfin-xml" and (why := _fewer(data)):
-        return why
     if form.name == "permas" and b"$FIN" not in data:
         return "is truncated: it does not end with $FIN"
     return _several(data, form)
@@ -54,21 +52,6 @@ def misread(data: bytes, form: Format) -> str | None:
 
 # A line behind BEGIN BULK that is no comment; meshio looks for one for ever.
 _BULK = re.compile(rb"(?s)BEGIN BULK.*?\n(?![$#]|//)[^\n]{3,}\n")
-
-
-def _fewer(data: bytes) -> str | None:
-    """Say that a file of dolfin announces more than it holds: meshio leaves the rest to what was in the memory."""
-    for what, one in ((b"vertices", rb"<vertex\b"), (b"cells", rb"<(?:triangle|tetrahedron)\b")):
-        size = re.search(rb"<%s\s[^>]*\bsize\s*=\s*[\"'](\d+)" % what, data)
-        held = len(re.findall(one, data))
-        if size and held < int(size[1]):
-            return f"is truncated: it announces {int(size[1]):,} {what.decode()} and holds {held:,}"
-    return None
-
-
-def without_counts(text: bytes) -> str | None:
-    """Say that a text has no line but comments where its counts should be: meshio looks for one for ever."""
-    return None if re.search(rb"(?m)^[ \t\r]*[^#\s]", text) else "is truncated: it ends before its counts"
 
 
 def _several(data: bytes, form: Format) -> str | None:
@@ -82,7 +65,6 @@ def _several(data: bytes, form: Format) -> str | None:
 # What stands once in a file of one mesh: of several, meshio reads one, or lays them over one another.
 _ONCE = {
     "avsucd": [("meshes", rb"(?m)^\s*(?:\d+[ \t]+){4}\d+\s*\n\s*\d+(?:[ \t]+[-+.\d]\S*){3}\s*\n")],
-    "dolfin-xml": [("meshes", rb"<mesh\b")],
     "nastran": [("bulk data sections", rb"(?mi)^\s*BEGIN\s+(?:BULK|SUPER)\b")],
     "netgen": [("meshes", rb"(?m)^\s*points\s*$")],
     "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],

@@ -172,6 +172,10 @@ def _mdpa(_: bytes, text: str) -> Format | None:
     return Format("mdpa") if re.match(r"(?://[^\n]*\n\s*)*Begin[ \t]+[A-Z]\w+", text) else None
 
 
+def _dolfin(_: bytes, text: str) -> Format | None:
+    return Format("dolfin-xml") if _is_xml(text) and "<dolfin" in text else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -262,6 +266,10 @@ OWN = {
         "elements, conditions and geometries, whose names tell what they are; data stay",
         "properties; parts of the model, also in parts",
     ),
+    "dolfin-xml": Own(
+        "dolfin", _dolfin, {".xml": "dolfin-xml"}, "DOLFIN",
+        "meshes of all types of cells; functions and values of the mesh, in it or beside it, stay", "values of cells",
+    ),
 }  # fmt: skip
 
 
@@ -279,8 +287,6 @@ _UCD = re.compile(rf"(?:#[^\n]*\n\s*)*(?:\d+[ \t]+){{4}}\d+\s*\n\s*\d+(?:\s+{_NU
 
 def _of_meshio(text: str) -> Format | None:
     """Recognise what only meshio reads."""
-    if _is_xml(text):
-        return Format("dolfin-xml") if "<dolfin" in text else None
     if text.startswith("* FLAC3D"):
         return Format("flac3d")
     return Format("avsucd") if _UCD.match(text) else None

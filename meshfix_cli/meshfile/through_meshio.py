@@ -169,7 +169,6 @@ def _source(mesh: Any, data: bytes, form: Format) -> Source:
         load=lambda: arrays,
         regions=regions_among(cell),
         data=data,
-        oriented=form.name != "dolfin-xml",  # whose cells have ascending vertices,
     )
 
 

@@ -105,6 +105,8 @@ def test_a_stream_works_like_a_file(form: str, tmp_path: Path) -> None:
 def test_the_orientation_is_mended_in_the_file(form: str, variant: str, tmp_path: Path) -> None:
     """Reverse some elements in the file by its own layout, and let --fix-orientation turn them back."""
     path = make(form, variant, tmp_path)
+    if not read(path).source.oriented:
+        pytest.skip("numbering is no matter of orientation in this format")
     document = read(path, fix_orientation=True)
     assert not document.mesh.topology.flipped.any()
     layout = document.source.layout

@@ -38,8 +38,9 @@ def test_formats(name: str) -> None:
     assert "Source:" in told, "the docstring names what describes the format"
     assert all((OWN[name].title, OWN[name].reads, OWN[name].groups)), "what docs/files.md says of it"
     assert all(f"`{extension}`" in README for extension in OWN[name].extensions), "README.md"
-    assert (TESTS / f"meshfile/test_{name}.py").exists()
-    assert hasattr(importlib.import_module(f"files_{name}"), "read_independently")
+    word = name.replace("-", "_")
+    assert (TESTS / f"meshfile/test_{word}.py").exists()
+    assert hasattr(importlib.import_module(f"files_{word}"), "read_independently")
     assert name in FORMATS or name in ("pvtu", "openfoam", "tetgen")  # several files, with tables of their own
 
 

@@ -102,9 +102,10 @@ class Rows(NamedTuple):
         if not 0 < count * columns <= len(text) - at:
             return None
         values, end, bad = kernels.scan_integers(text, at, count * columns)
-        table = values.astype(np.int64, copy=False).reshape(count, columns) if bad < 0 else np.empty((0, columns))
-        alike = len(table) and (table[:, column] == table[0, column]).all()
-        return cls(text, at, end, table) if alike else None
+        if bad >= 0:
+            return None
+        table = values.astype(np.int64, copy=False).reshape(count, columns)
+        return cls(text, at, end, table) if (table[:, column] == table[0, column]).all() else None
 
     @property
     def counts(self) -> Int64:

@@ -12,10 +12,12 @@ import numpy as np
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.meshfile.document import Document
+from meshfix_cli.meshfile.formats import OWN
 
-FORMATS = ("gmsh", "vtk", "vtu", "obj", "abaqus", "medit", "ply", "stl", "su2", "med", "exodus", "cgns", "xdmf")
-MODULES = {name: importlib.import_module(f"files_{name}") for name in FORMATS}
-WORD = re.compile(rb"([^\s,]+)")
+IN_SEVERAL_FILES = ("pvtu", "openfoam", "tetgen")  # which have tables of their own
+FORMATS = tuple(name for name in OWN if name not in IN_SEVERAL_FILES)
+MODULES = {name: importlib.import_module(f"files_{name.replace('-', '_')}") for name in FORMATS}
+WORD = re.compile(rb"([^\s,\"'=<>]+)")
 
 
 def make(form: str, variant: str, folder: Path) -> Path:

@@ -333,6 +333,15 @@ def sines(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[F
 def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tuple[float, float, Float64, Float64]:
     """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""
 
+def cells_of_faces(
+    offsets: Int64, vertices: Int64, owner: Int64, neighbour: Int64, cells: int, threads: int
+) -> tuple[Int64, Int64, Int8, Int64]:
+    """Cells that are given by their faces, whose vertices have offsets (f + 1,).
+
+    Where the faces of each cell begin (cells + 1,), and which they are; by its corners (cells,), 4, 5, 6 or 8, which
+    element it is, 0 if none; and its nodes (cells, 8) in the order of its type.
+    """
+
 def find_words(data: bytes, at: int, count: int) -> Int64:
     """Spans (count, 2) of the first words at or behind an offset; fewer where the data end."""
 

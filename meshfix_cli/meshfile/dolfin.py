@@ -124,4 +124,4 @@ def _keys(raw: NDArray[np.uint8], at: Int64) -> NDArray[np.uint16]:
     while (between := (raw[at] == ord("=")) | (raw[at] <= ord(" "))).any() and at.min() > 0:
         at -= between
     before = np.maximum(raw[at - 1], ord(" ")).astype(np.uint16)
-    return (before << 8) | raw[at]
+    return (before << np.uint16(8)) | raw[at]

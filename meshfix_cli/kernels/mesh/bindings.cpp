@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "mesh/crossings.hpp"
+#include "mesh/faces.hpp"
 #include "mesh/folds.hpp"
 #include "mesh/python.hpp"
 
@@ -166,6 +167,16 @@ auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movab
     });
     return std::make_tuple(to_numpy(std::move(found.vertices), static_cast<std::size_t>(self.dimension)),
                            to_numpy(std::move(found.owners)), to_numpy(std::move(found.shared)));
+}
+
+nb::tuple cells_of_faces_py(const Vector<const std::int64_t>& offsets, const Vector<const std::int64_t>& vertices,
+                            const Vector<const std::int64_t>& owner, const Vector<const std::int64_t>& neighbour,
+                            std::int64_t cells, int threads) {
+    const FacesView faces{offsets.data(), vertices.data(), owner.data(), neighbour.data(),
+                          static_cast<std::int64_t>(owner.shape(0))};
+    CellsOfFaces found = cells_of_faces(faces, cells, threads);
+    return nb::make_tuple(to_numpy(std::move(found.starts)), to_numpy(std::move(found.faces)),
+                          to_numpy(std::move(found.corners)), to_numpy(std::move(found.nodes), CellsOfFaces::NODES));
 }
 
 // Rows of a shape's code, the group of parallel edges, which is another than that of the row before, and two nodes.
@@ -337,6 +348,8 @@ void bind_mesh(nb::module_& m) {
         .def_prop_ro("neighbours", &view<&Connectivity::neighbours>)
         .def_prop_ro("colour_offsets", &view<&Connectivity::colour_offsets>)
         .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
+    m.def("cells_of_faces", &cells_of_faces_py, "offsets"_a.noconvert(), "vertices"_a.noconvert(), "owner"_a.noconvert(),
+          "neighbour"_a.noconvert(), "cells"_a, "threads"_a);
 }
 
 }  // namespace meshfix

@@ -92,12 +92,12 @@ def _source(data: bytes, folder: Path) -> tuple[Source, InPlace]:
         coordinates = points.vectors()
     faces, runs = _faces(folder, len(coordinates.begin)), Runs()
     zones = list(_zones(folder, "cellZones"))
-    zone_of = np.zeros(int(max(faces.owner.max(initial=-1), faces.neighbour.max(initial=-1))) + 1, dtype=np.int64)
+    zone_of = np.zeros(faces.cells, dtype=np.int64)
     for number, (name, cells) in enumerate(zones, start=1):
         if len(cells) and not 0 <= cells.min() <= cells.max() < len(zone_of):
             raise ReadError(f"cellZones: {name} names a cell that is not there")
         zone_of[cells] = number
-    for kind, vertices, ids in faces.cells():
+    for kind, vertices, ids in faces.elements():
         for name, cells in zones:
             runs.put(name, len(runs.cells), np.flatnonzero(np.isin(ids, cells)))
         runs.add(Cells(kind, vertices, ids), _no_corners, {_ZONE: zone_of[ids]})

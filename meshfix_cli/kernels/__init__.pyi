@@ -354,6 +354,33 @@ def find_lines(data: bytes, at: int, count: int) -> tuple[Int64, Int64, int]:
     Spans (k, 2), the number of the first word of each line and of all (lines + 1,), and the offset behind the last.
     """
 
+def read_lines(data: bytes, at: int, count: int) -> tuple[Int64, Int64, int]:
+    """Integers of the words of the same lines, and their starts and end.
+
+    A word that is none has a number whose bits are the highest and, from the lowest on, those of its first seven bytes.
+    """
+
+def find_cards(data: bytes) -> tuple[Uint8, Int64, Int64, Int64, Int64]:
+    """Cards of Nastran: the different names (k, 8) in capitals and, for each of n cards, what follows.
+
+    Which name it has (n,), its offset (n,), how many fields up to the last that is not blank (n,), or -1 where lines
+    that follow it continue another card, and the integers in its first six fields (n, 6): the smallest that there is
+    where a field is blank, the next one where it, or one before it, is something else or stands on another line.
+    """
+
+def card_integers(data: bytes, offsets: Int64, first: int, last: int, texts: bool) -> tuple[Int64, int]:
+    """Integers (k, last - first) in fields of cards at offsets (k,), and where there is none, or -1.
+
+    Blank fields are the smallest integer that there is, and so are, if `texts`, those from a text on.
+    """
+
+def card_fields(data: bytes, offsets: Int64, most: int, whole: bool) -> tuple[Int64, Int64, Uint8]:
+    """Fields of cards at offsets (k,), at most so many of each; whole: all their columns, and those that are blank.
+
+    Spans (f, 2), -1 for what a line does not reach that another continues; the number of the first field of each card
+    and of all (k + 1,); and the columns of each (f,), 0 where it is free.
+    """
+
 def use_threads(threads: int) -> None:
     """Let the passes over text, from here to the end of this file, take as many threads: 1 at first."""
 

@@ -11,9 +11,6 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from meshfix_cli.meshfile.formats import HEAD, Format
 
 MOST_BYTES = 65536  # of a data set that may be texts
@@ -43,15 +40,9 @@ def misread(data: bytes, form: Format) -> str | None:
 
     Several meshes in one file are laid over one another.
     """
-    if form.name == "nastran" and re.search(rb"BEGIN BULK", data) and not _BULK.search(data):
-        return "is truncated: it ends with BEGIN BULK"
     if form.name == "permas" and b"$FIN" not in data:
         return "is truncated: it does not end with $FIN"
     return _several(data, form)
-
-
-# A line behind BEGIN BULK that is no comment; meshio looks for one for ever.
-_BULK = re.compile(rb"(?s)BEGIN BULK.*?\n(?![$#]|//)[^\n]{3,}\n")
 
 
 def _several(data: bytes, form: Format) -> str | None:
@@ -64,8 +55,6 @@ def _several(data: bytes, form: Format) -> str | None:
 
 # What stands once in a file of one mesh: of several, meshio reads one, or lays them over one another.
 _ONCE = {
-    "avsucd": [("meshes", rb"(?m)^\s*(?:\d+[ \t]+){4}\d+\s*\n\s*\d+(?:[ \t]+[-+.\d]\S*){3}\s*\n")],
-    "nastran": [("bulk data sections", rb"(?mi)^\s*BEGIN\s+(?:BULK|SUPER)\b")],
     "netgen": [("meshes", rb"(?m)^\s*points\s*$")],
     "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],
     "su2": [("zones", rb"(?m)^\s*(?:NZONE\s*=\s*(?:[2-9]|1\d)|IZONE\s*=)"), ("zones", rb"(?m)^\s*NPOIN\s*=")],
@@ -78,46 +67,6 @@ def missing_cells(data: bytes, form: Format, cells: int) -> str | None:
     if found and cells < int(found[1]):
         return f"is truncated: it announces {int(found[1]):,} cells and holds {cells:,}"
     return None
-
-
-def numbers(data: bytes, form: Format) -> dict[str, NDArray[np.int64]]:
-    """Return for each type of cells the numbers of its cells: the file's own, or positions among all, from 0.
-
-    meshio groups cells by type; empty where its order tells all that there is.
-    """
-    if form.name == "su2":
-        begin = re.search(rb"(?m)^\s*NELEM\s*=\s*(\d+)[^\n]*\n", data)
-        lines = data[begin.end() :].split(b"\n", int(begin[1]))[: int(begin[1])] if begin else []
-        kinds = [_SU2.get(line.split(None, 1)[0], "") for line in lines if line.strip()]
-        return _by_kind(kinds, np.arange(len(kinds)))
-    if form.name not in ("nastran", "avsucd"):
-        return {}
-    pattern, names = (_CARD, _NASTRAN) if form.name == "nastran" else (_LINE, _UCD_TYPES)
-    found = [(one["kind"], int(one["id"])) for one in pattern.finditer(data)]
-    return _by_kind(
-        [names.get(kind, "") for kind, _ in found], np.array([number for _, number in found], dtype=np.int64)
-    )
-
-
-def _by_kind(kinds: list[str], ids: NDArray[np.int64]) -> dict[str, NDArray[np.int64]]:
-    order = np.array(kinds)
-    return {kind: ids[order == kind] for kind in dict.fromkeys(kinds) if kind}
-
-
-_CARD = re.compile(rb"(?m)^(?P<kind>C(?:BAR|ROD|TRI|QUA|TET|PYR|PEN|HEX)[A-Z]*\d*)\*?[ \t,]+(?P<id>\d+)")
-_LINE = re.compile(rb"(?m)^\s*(?P<id>\d+)\s+-?\d+\s+(?P<kind>[a-z]+)\s")
-_SU2 = {
-    b"3": "line", b"5": "triangle", b"9": "quad", b"10": "tetra", b"12": "hexahedron", b"13": "wedge", b"14": "pyramid",
-}  # fmt: skip
-_NASTRAN = {
-    b"CBAR": "line", b"CROD": "line", b"CTRIA3": "triangle", b"CTRIAR": "triangle", b"CQUAD4": "quad",
-    b"CQUADR": "quad", b"CTETRA": "tetra", b"CPYRA": "pyramid", b"CPYRAM": "pyramid", b"CPENTA": "wedge",
-    b"CHEXA": "hexahedron",
-}  # fmt: skip
-_UCD_TYPES = {
-    b"line": "line", b"tri": "triangle", b"quad": "quad", b"tet": "tetra", b"pyr": "pyramid", b"prism": "wedge",
-    b"hex": "hexahedron",
-}  # fmt: skip
 
 
 def words_lost(before: bytes, after: bytes) -> list[str]:

@@ -176,6 +176,28 @@ def _dolfin(_: bytes, text: str) -> Format | None:
     return Format("dolfin-xml") if _is_xml(text) and "<dolfin" in text else None
 
 
+_CARD = re.compile(r"(?mi)^(?:BEGIN[ \t,]+BULK\b|CEND\s*$|(?:GRID|CTRIA3|CQUAD4|CTETRA|CHEXA)\*?[ \t,]+\d+[ \t,])")
+
+
+def _nastran(_: bytes, text: str) -> Format | None:
+    """Recognise the beginning of bulk data, or the first cards of a mesh."""
+    return Format("nastran") if _CARD.search(text) else None
+
+
+# A line of five counts, behind comments, and the first point; or the first step of several. With four, as some write,
+# it may be one of TetGen.
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_UCD = re.compile(
+    rf"(?:#[^\n]*\n\s*)*(?:(?:\d+[ \t]+){{4}}\d+\s*[\r\n]\s*\d+(?:[ \t]+{_NUMBER}){{3}}\s*[\r\n]"
+    r"|\d+\s+(?:data|geom|data_geom)\s+step\d+)"
+)
+
+
+def _avsucd(_: bytes, text: str) -> Format | None:
+    """Recognise what may be called .inp, as files of Abaqus are."""
+    return Format("avsucd") if _UCD.match(text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -266,6 +288,16 @@ OWN = {
         "elements, conditions and geometries, whose names tell what they are; data stay",
         "properties; parts of the model, also in parts",
     ),
+    "avsucd": Own(
+        "avsucd", _avsucd, {".avs": "avsucd", ".ucd": "avsucd", ".inp": "avsucd"}, "AVS UCD",
+        "text, of one or several steps of one mesh; data stay; cells of second order are held", "materials",
+    ),
+    "nastran": Own(
+        "nastran", _nastran, dict.fromkeys((".bdf", ".nas", ".fem", ".blk"), "nastran"), "Nastran, OptiStruct",
+        "fields in columns of 8 and 16 and between commas, under other names too; points in one rectangular system; "
+        "no `INCLUDE`; rigid elements, springs and masses hold their points",
+        "properties; single-point constraints",
+    ),
     "dolfin-xml": Own(
         "dolfin", _dolfin, {".xml": "dolfin-xml"}, "DOLFIN",
         "meshes of all types of cells; functions and values of the mesh, in it or beside it, stay", "values of cells",
@@ -280,16 +312,9 @@ def sniff(data: bytes) -> Format | None:
     return next((form for form in found if form is not None), None) or _of_meshio(text)
 
 
-# A line of five counts, behind comments, and the first node; such a file may be called .inp, as those of Abaqus.
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-_UCD = re.compile(rf"(?:#[^\n]*\n\s*)*(?:\d+[ \t]+){{4}}\d+\s*\n\s*\d+(?:\s+{_NUMBER}){{3}}\s*\n")
-
-
 def _of_meshio(text: str) -> Format | None:
     """Recognise what only meshio reads."""
-    if text.startswith("* FLAC3D"):
-        return Format("flac3d")
-    return Format("avsucd") if _UCD.match(text) else None
+    return Format("flac3d") if text.startswith("* FLAC3D") else None
 
 
 def by_name(path: Path) -> Format | None:

@@ -73,6 +73,8 @@ class Places:
         Characters that the format allows for a number; 0: any number of them.
     fields : {"", "free", "padded"}
         Numbers are those of Fortran's and Nastran's fields of `longest` columns, which are to be filled or not.
+    widths : (n, k) int or None
+        How many columns each field has that is to be filled, where these differ; 0: it is free.
     """
 
     begin: NDArray[np.int64]
@@ -80,6 +82,7 @@ class Places:
     dtype: np.dtype[Any]
     longest: int = 0
     fields: str = ""
+    widths: NDArray[np.integer[Any]] | None = None
 
     @classmethod
     def of_text(cls, spans: Spans, dtype: str = "f8", longest: int = 0, fields: str = "") -> Places:
@@ -100,7 +103,8 @@ class Places:
 
     def at(self, index: Any) -> Places:
         """Places of some of the numbers."""
-        return replace(self, begin=self.begin[index], end=None if self.end is None else self.end[index])
+        end, widths = (None if values is None else values[index] for values in (self.end, self.widths))
+        return replace(self, begin=self.begin[index], end=end, widths=widths)
 
     def read(self, data: bytes) -> Any:
         """Return the numbers (n, k) in the machine's byte order; ReadError where there are none."""
@@ -128,7 +132,10 @@ class Places:
 
     def replace(self, which: NDArray[np.bool_], values: Points) -> Edits:
         """Write numbers (n, k) where `which` (n, k) is True."""
-        return Edits(self.at(which).spans, *self._encode(values[which]))
+        places, words = self.at(which), self._encode(values[which])
+        if places.widths is None:
+            return Edits(places.spans, *words)
+        return places._filled([words[0][first:last] for first, last in words[1].tolist()])
 
     def turn(self, data: bytes, cells: Turned) -> Edits:
         """Put the numbers of some rows into another order."""
@@ -138,6 +145,16 @@ class Places:
     def copied(self, data: bytes, others: Places) -> Edits:
         """Write the numbers that stand in as many other places, as they are."""
         words = [data[first:last] for first, last in others.spans.reshape(-1, 2).tolist()]
+        if self.fields == "padded":  # the last field of a line may be short, and tabs reach from column to column
+            words = [word.expandtabs(8).ljust(self.longest) for word in words]
+        return self._put(words)
+
+    def _filled(self, words: list[bytes]) -> Edits:
+        """Write words behind blanks that fill their fields."""
+        widths = [] if self.widths is None else self.widths.ravel().tolist()
+        return self._put([word.rjust(width) for word, width in zip(words, widths, strict=True)])
+
+    def _put(self, words: list[bytes]) -> Edits:
         ends = np.cumsum([0, *map(len, words)])
         return Edits(np.ascontiguousarray(self.spans.reshape(-1, 2)), b"".join(words), pairs(ends))
 

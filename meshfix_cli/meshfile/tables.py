@@ -23,6 +23,7 @@ from meshfix_cli.meshfile.text import Spans, in_line, integers_at, words
 
 Int64 = NDArray[np.int64]
 
+_CODES = -(2**62)  # below, integers stand for words
 _MOST_RUNS = 1000  # above, cells of a kind are gathered from all over the file
 
 
@@ -139,6 +140,65 @@ def lines(text: bytes, at: int, count: int, what: str = "line") -> Lines:
     return Lines(text, *found)
 
 
+class IntegerLines(NamedTuple):
+    """The integers of some lines, and what stands for words among them.
+
+    Attributes
+    ----------
+    values : (k,) int64
+    starts : (n+1,) int64
+        The number of the first value of each line, and of all values.
+    end : int
+        The offset behind the last word.
+    """
+
+    values: Int64
+    starts: Int64
+    end: int
+
+    @property
+    def counts(self) -> Int64:
+        """(n,) int64: how many words a line has."""
+        return np.diff(self.starts)
+
+    def columns(self, first: int, last: int, rows: Int64) -> Int64:
+        """Return the values (k, last - first) of some lines, all of which have as many."""
+        if len(rows) and (np.diff(rows) == 1).all() and (self.counts[rows] == self.counts[rows[0]]).all():
+            begin, end = self.starts[rows[0]], self.starts[rows[-1] + 1]
+            return self.values[begin:end].reshape(len(rows), -1)[:, first:last]
+        return self.values[self.starts[:-1][rows][:, None] + np.arange(first, last)]
+
+
+def integer_lines(text: bytes, at: int, count: int, what: str, *names: int) -> IntegerLines:
+    """Read the integers of the next lines that have some words, where no places of these are needed.
+
+    Parameters
+    ----------
+    names : int
+        Columns that may hold words.
+
+    Raises
+    ------
+    ReadError
+        There are not as many lines as announced, or other words in them.
+    """
+    table = IntegerLines(*kernels.read_lines(text, at, count))
+    if not 0 <= count == len(table.starts) - 1:
+        raise ReadError(f"is truncated: {counted(count, what, what + 's')} announced, and not all are there")
+    words = np.flatnonzero(table.values < _CODES)
+    if len(names) == 1 and np.array_equal(words, table.starts[:-1] + names[0]):
+        return table
+    columns = words - table.starts[np.searchsorted(table.starts, words, side="right") - 1]
+    if len(wrong := words[~np.isin(columns, names)]):
+        integers_at(text, lines(text, at, count, what).spans[wrong])
+    return table
+
+
+def word_of(code: int) -> str:
+    """Return the first seven characters of the word for which an integer stands."""
+    return (code - np.iinfo(np.int64).min).to_bytes(8, "little").rstrip(b"\0").decode("latin-1")
+
+
 def rows(text: bytes, at: int, count: int, columns: int) -> tuple[Spans, int]:
     """Find the words (count, columns, 2) of rows of equally many, wherever lines end, and the offset behind them."""
     if not 0 <= count * columns <= len(text) - at:
@@ -172,6 +232,10 @@ class Numbering:
         """Return the rows (...) of numbers (...); -1: there is none. Of a number given twice, the first."""
         if not len(self.sorted):
             return np.full(numbers.shape, -1)
+        if self._gapless and self.order is None:
+            at = numbers - self.sorted[0]
+            if not at.size or (at.min() >= 0 and at.max() < len(self.sorted)):
+                return at
         at = numbers - self.sorted[0] if self._gapless else np.searchsorted(self.sorted, numbers)
         at = np.clip(at, 0, len(self.sorted) - 1)
         return np.where(self.sorted[at] == numbers, at if self.order is None else self.order[at], -1)
@@ -198,7 +262,8 @@ class Numbering:
         if (number := self.twice()) is not None:
             raise ReadError(f"the point {number} is defined twice")
         found = self.rows_of(numbers)
-        if (unknown := np.argwhere(found < 0)).size:
+        if found.size and found.min() < 0:
+            unknown = np.argwhere(found < 0)
             cell = unknown[0][0] if cells is None else cells[unknown[0][0]]
             named = numbers[tuple(unknown[0])]
             raise ReadError(f"is truncated or not readable: the cell {cell} names the point {named}, and there is none")

@@ -59,7 +59,7 @@ def short_integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int32] 
     """Do the same, in 32 bits where these are enough."""
     values, end, bad = kernels.scan_integers(data, at, count)
     if bad >= 0:
-        raise _not_a_number(data, bad, "an integer")
+        raise not_a_number(data, bad, "an integer")
     return values, end
 
 
@@ -73,7 +73,7 @@ def integers_at(data: bytes, spans: Spans, slash: bool = False) -> NDArray[np.in
     flat = np.ascontiguousarray(spans.reshape(-1, 2))
     values, bad = kernels.integers(data, flat, slash)
     if bad >= 0:
-        raise _not_a_number(data, int(flat[bad, 0]), "an integer")
+        raise not_a_number(data, int(flat[bad, 0]), "an integer")
     return values.reshape(spans.shape[:-1])
 
 
@@ -82,7 +82,7 @@ def numbers_at(data: bytes, spans: Spans, dtype: np.dtype[Any]) -> NDArray[np.fl
     flat = np.ascontiguousarray(spans.reshape(-1, 2))
     values, bad = kernels.numbers(data, flat, dtype.itemsize == 4)
     if bad >= 0:
-        raise _not_a_number(data, int(flat[bad, 0]), "a number")
+        raise not_a_number(data, int(flat[bad, 0]), "a number")
     return values.reshape(spans.shape[:-1]).astype(dtype, copy=False)
 
 
@@ -102,7 +102,8 @@ def in_line(data: bytes, at: int, what: str) -> ReadError:
     return ReadError(f"line {number}: {what}")
 
 
-def _not_a_number(data: bytes, at: int, what: str) -> ReadError:
+def not_a_number(data: bytes, at: int, what: str) -> ReadError:
+    """Return the error that tells what a word at an offset is not."""
     if not 0 <= at < len(data):
         return ReadError("is truncated: a number is missing" + (" at its end" if at >= len(data) else ""))
     word = data[at : at + 40].replace(b",", b" ").split(maxsplit=1)[0].decode("latin-1")

@@ -9,7 +9,6 @@ import os
 import re
 import tempfile
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -151,7 +150,7 @@ def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, 
 
 def _source(mesh: Any, data: bytes, form: Format) -> Source:
     points = _native(mesh.points)
-    cells = _numbered([Cells(block.type, _native(block.data)) for block in mesh.cells], foreign.numbers(data, form))
+    cells = [Cells(block.type, _native(block.data)) for block in mesh.cells]
     cell = {name: [_native(data) for data in runs] for name, runs in mesh.cell_data.items()}
     arrays = Arrays(
         point={name: _native(data) for name, data in mesh.point_data.items()},
@@ -170,22 +169,6 @@ def _source(mesh: Any, data: bytes, form: Format) -> Source:
         regions=regions_among(cell),
         data=data,
     )
-
-
-def _numbered(cells: list[Cells], numbers: dict[str, NDArray[np.int64]]) -> list[Cells]:
-    """Give cells the numbers of their type, one run of it after the other, where these are as many."""
-    counts: dict[str, int] = {}
-    for run in cells:
-        counts[run.type] = counts.get(run.type, 0) + len(run.vertices)
-    used = dict.fromkeys(counts, 0)
-    numbered = []
-    for run in cells:
-        mine = numbers.get(run.type, np.empty(0, dtype=np.int64))
-        begin = used[run.type]
-        used[run.type] += len(run.vertices)
-        known = len(mine) == counts[run.type]
-        numbered.append(replace(run, ids=mine[begin : used[run.type]]) if known else run)
-    return numbered
 
 
 @contextlib.contextmanager

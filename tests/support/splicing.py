@@ -27,6 +27,17 @@ def make(form: str, variant: str, folder: Path) -> Path:
     return path
 
 
+def value(word: bytes) -> float:
+    """A number, as Fortran and Nastran may write it: the exponent after D, or after nothing but its sign."""
+    return float(re.sub(rb"(?<=[\d.])(?=[+-])", b"e", word.replace(b"D", b"e").strip() or b"0"))
+
+
+def pieces(form: str, variant: str, data: bytes) -> list[bytes]:
+    """Words, and what stands between them; of files whose numbers fill columns, fields by their columns."""
+    module = MODULES[form]
+    return module.fields(data) if variant in getattr(module, "PADDED", ()) else WORD.split(data)
+
+
 def repaired(path: Path | str, target: Path | str, **options: Any) -> tuple[Document, np.ndarray]:
     """Untangle a file; the document, and the points as the new file must have them."""
     document = read(path, **options)

@@ -2,6 +2,7 @@
 #include <numeric>
 
 #include "arrays.hpp"
+#include "text/cards.hpp"
 #include "text/text.hpp"
 
 namespace meshfix {
@@ -36,6 +37,39 @@ auto line_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offs
 nb::tuple find_lines_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
     Lines lines = find_lines(view_of(data), at, count);
     return nb::make_tuple(to_numpy(std::move(lines.spans), 2), to_numpy(std::move(lines.starts)), lines.end);
+}
+
+nb::tuple read_lines_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    LineIntegers lines = read_lines(view_of(data), at, count);
+    return nb::make_tuple(to_numpy(std::move(lines.values)), to_numpy(std::move(lines.starts)), lines.end);
+}
+
+nb::tuple find_cards_py(const nb::bytes& data) {
+    Cards cards = find_cards(CardText::searched(view_of(data)));
+    return nb::make_tuple(to_numpy(std::move(cards.names), 8), to_numpy(std::move(cards.kinds)),
+                          to_numpy(std::move(cards.begin)), to_numpy(std::move(cards.fields)),
+                          to_numpy(std::move(cards.heads), Cards::HEAD));
+}
+
+nb::tuple card_fields_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t most, bool whole) {
+    const CardText deck(view_of(data));
+    CardFields cards;
+    for (std::size_t i = 0; i < offsets.shape(0); ++i) add_card(deck, offsets(i), most, whole, cards);
+    return nb::make_tuple(to_numpy(std::move(cards.spans), 2), to_numpy(std::move(cards.starts)), to_numpy(std::move(cards.widths)));
+}
+
+auto card_integers_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t first, std::int64_t last,
+                      bool texts) {
+    const CardText deck(view_of(data));
+    const auto count = static_cast<std::int64_t>(offsets.shape(0)), columns = last - first;
+    std::vector<std::int64_t> values(count * columns, BLANK_FIELD);
+    std::vector<std::int64_t> bad(count / PER_ITEM + 1, -1);
+    for_each_range(count, PER_ITEM, text_threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        for (std::int64_t i = begin; i < end && bad[item] < 0; ++i)
+            bad[item] = read_card(deck, offsets(i), first, last, texts, values.data() + i * columns);
+    });
+    const auto found = std::find_if(bad.begin(), bad.end(), [](std::int64_t at) { return at >= 0; });
+    return std::make_pair(to_numpy(std::move(values), columns), found == bad.end() ? -1 : *found);
 }
 
 std::int64_t behind_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
@@ -165,6 +199,10 @@ void bind_text(nb::module_& m) {
     m.def("find_words", &find_words_py, "data"_a, "at"_a, "count"_a);
     m.def("line_words", &line_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a);
     m.def("find_lines", &find_lines_py, "data"_a, "at"_a, "count"_a);
+    m.def("read_lines", &read_lines_py, "data"_a, "at"_a, "count"_a);
+    m.def("find_cards", &find_cards_py, "data"_a);
+    m.def("card_fields", &card_fields_py, "data"_a, "offsets"_a.noconvert(), "most"_a, "whole"_a);
+    m.def("card_integers", &card_integers_py, "data"_a, "offsets"_a.noconvert(), "first"_a, "last"_a, "texts"_a);
     m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
     m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);
     m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);

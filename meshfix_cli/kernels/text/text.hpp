@@ -146,6 +146,13 @@ inline bool read_integer(std::string_view word, std::int64_t& value, bool slash)
     return error == std::errc() && (end == word.data() + word.size() || (slash && *end == '/'));
 }
 
+// The number of eight digits, of which the first is the lowest byte.
+inline std::int64_t digits_of_bytes(std::uint64_t bytes) {
+    bytes = bytes * 10 + (bytes >> 8);  // pairs of digits, then pairs of pairs
+    constexpr std::uint64_t PAIRS = 0x000000FF000000FF;
+    return static_cast<std::int64_t>(((bytes & PAIRS) * 0x000F424000000064 + (bytes >> 16 & PAIRS) * 0x0000271000000001) >> 32);
+}
+
 // Reads an integer of at most seven digits, of which none is looked at by itself: how many they are has no order that a
 // processor could foresee. Returns how many they are; 0: it is something else, or near the end.
 inline int read_few_digits(const char* p, const char* end, std::int64_t& value) {
@@ -157,10 +164,7 @@ inline int read_few_digits(const char* p, const char* end, std::int64_t& value) 
     const std::uint64_t others = (bytes | (bytes + 0x7676767676767676)) & 0x8080808080808080;
     if (others == 0 || (others & 0x80) != 0) return 0;
     const int digits = __builtin_ctzll(others) / 8;
-    bytes <<= 64 - 8 * digits;           // zeros in front of them
-    bytes = bytes * 10 + (bytes >> 8);  // pairs of digits, then pairs of pairs
-    constexpr std::uint64_t PAIRS = 0x000000FF000000FF;
-    value = static_cast<std::int64_t>(((bytes & PAIRS) * 0x000F424000000064 + (bytes >> 16 & PAIRS) * 0x0000271000000001) >> 32);
+    value = digits_of_bytes(bytes << (64 - 8 * digits));  // zeros in front of them
     return digits;
 #else
     static_cast<void>(p), static_cast<void>(end), static_cast<void>(value);
@@ -191,6 +195,45 @@ inline bool read_plain_integer(std::string_view text, std::int64_t& at, std::int
     if (minus) value = -value;
     at = p - text.data();
     return true;
+}
+
+// What stands for a word that is not an integer: its first seven bytes, beside a sign that no number of a mesh has.
+inline std::int64_t code_of(std::string_view word) {
+    auto code = std::uint64_t{1} << 63;
+    for (std::size_t i = 0; i < std::min<std::size_t>(7, word.size()); ++i)
+        code |= std::uint64_t{static_cast<std::uint8_t>(word[i])} << 8 * i;
+    return static_cast<std::int64_t>(code);
+}
+
+// The integers of the next lines that have words, as `find_lines` finds them.
+struct LineIntegers {
+    std::vector<std::int64_t> values, starts{0};
+    std::int64_t end;
+};
+
+inline LineIntegers read_lines(std::string_view text, std::int64_t at, std::int64_t count) {
+    const auto size = static_cast<std::int64_t>(text.size());
+    LineIntegers lines;
+    lines.end = at;
+    lines.values.reserve(std::clamp<std::int64_t>(8 * std::min(count, size), 0, (size - at) / 2 + 1));
+    for (; count > 0; --count) {
+        while (at < size && separates(text[at])) ++at;
+        if (at >= size) break;
+        while (at < size && !ends_line(text[at])) {
+            std::int64_t value = 0;
+            if (!read_plain_integer(text, at, value)) {
+                const Span word = next_word(text, at, true);
+                const std::string_view bytes = text.substr(word.begin, word.end - word.begin);
+                if (!read_integer(bytes, value, false)) value = code_of(bytes);
+                at = word.end;
+            }
+            lines.values.push_back(value);
+            lines.end = at;
+            while (at < size && separates(text[at]) && !ends_line(text[at])) ++at;
+        }
+        lines.starts.push_back(static_cast<std::int64_t>(lines.values.size()));
+    }
+    return lines;
 }
 
 // Integers of the words from an offset on, in the type T: as many as there are in a row, at most `count`.
@@ -343,12 +386,29 @@ inline std::string as_field(std::string_view scientific, bool letter) {
 
 // How many digits it takes to read back to the value.
 inline int digits_of(double value) {
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+    char buffer[40];
+    const char* const end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::scientific).ptr;
+    int digits = 0;
+    for (const char* c = buffer; c < end && *c != 'e'; ++c) digits += *c >= '0' && *c <= '9';
+#else
     std::string shortest;
     append_shortest(shortest, value, 0);
     int digits = 0;
     for (const char c : std::string_view(shortest).substr(0, shortest.find('e')))
         digits += c >= '0' && c <= '9' && (digits > 0 || c != '0');
+#endif
     return std::max(digits, 1);
+}
+
+// Writes a number as "-d.ddde+xx", with so many digits; returns what is written.
+inline std::string_view write_scientific(char (&buffer)[40], double value, int digits) {
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+    const char* const end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::scientific, digits - 1).ptr;
+    return {buffer, static_cast<std::size_t>(end - buffer)};
+#else
+    return {buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof buffer, "%.*e", digits - 1, value))};
+#endif
 }
 
 // Appends the number with as many digits as a field of so many columns holds, at most those that it takes to read back,
@@ -357,8 +417,7 @@ inline void append_field(std::string& text, double value, int columns, bool padd
     std::string field;
     for (int digits = std::min(digits_of(value), columns - 1); digits > 0; --digits) {
         char buffer[40];
-        std::snprintf(buffer, sizeof buffer, "%.*e", digits - 1, value);
-        field = as_field(buffer, columns > 10);
+        field = as_field(write_scientific(buffer, value, digits), columns > 10);
         if (static_cast<int>(field.size()) <= columns) break;
     }
     const int missing = columns - static_cast<int>(field.size());

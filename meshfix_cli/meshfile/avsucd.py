@@ -10,7 +10,7 @@ VTK, "vtkAVSucdReader.h".
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 
 import numpy as np
@@ -22,7 +22,6 @@ from meshfix_cli.meshfile.splice import InPlace, Places, Points
 from meshfix_cli.meshfile.tables import (
     Int64,
     IntegerLines,
-    Lines,
     Numbering,
     Runs,
     alike,
@@ -59,17 +58,17 @@ def parse(data: bytes) -> Source:
     text = without(data, _COMMENT, b"#")
     counts, at = _counts(text)
     table, at = rows(text, at, counts[0], 4)
-    cells = integer_lines(text, at, counts[1], "cell", 2)
+    cells = integer_lines(text, at, counts[1], "cell")
     if not any(counts[2:]) and (left := text[cells.end :].lstrip()):
         raise in_line(text, len(text) - len(left), "there are more lines than announced")
     coordinates, points = Places.of_text(table[:, 1:]), Numbering(integers_at(text, table[:, 0]))
-    place, runs, where = coordinates.read(text), Runs(), partial(lines, text, at, counts[1])
-    found = [(chosen, _cells(cells, chosen, points, where)) for chosen in _by_type(cells)]
+    place, runs = coordinates.read(text), Runs()
+    found = [(chosen, _cells(cells, chosen, points)) for chosen in _by_type(cells)]
     orders = _TOP_FIRST if sum(_volume(place, run) for _, run in found) < 0 else _TOP_LAST
     for chosen, run in found:
         order = np.array(orders.get(run.type, range(run.vertices.shape[1])))
         ordered = Cells(run.type, run.vertices[:, order] if run.type in orders else run.vertices, run.ids)
-        runs.add(ordered, partial(_corners, where, chosen, order), {_MATERIAL: cells.columns(1, 2, chosen)[:, 0]})
+        runs.add(ordered, partial(_corners, cells, chosen, order), {_MATERIAL: cells.integers(1, 2, chosen)[:, 0]})
     layout = InPlace(data, coordinates, runs.corners)
     untold = ("comments",) * (text is not data) + ("data of points and cells",) * any(counts[2:])
     return Source(place, runs.cells, layout, runs.arrays, (_MATERIAL,), untold=untold)
@@ -96,17 +95,16 @@ def _by_type(cells: IntegerLines) -> Iterator[Int64]:
     yield from alike(types, counts)
 
 
-def _cells(cells: IntegerLines, chosen: Int64, points: Numbering, where: Callable[[], Lines]) -> Cells:
+def _cells(cells: IntegerLines, chosen: Int64, points: Numbering) -> Cells:
     """Read cells of one type and number of points; of those of second order the order of points is not known."""
     size = int(cells.counts[chosen[0]]) - 3
-    name = word_of(int(cells.columns(2, 3, chosen)[0, 0])) if size > 0 else ""
+    name = word_of(int(cells.words(2, 3, chosen)[0, 0])) if size > 0 else ""
     shape = _TYPES.get(name.lower().rstrip("2"))
     if shape is None or size < ELEMENTS[shape].nodes:
-        table = where()
-        at = int(table.spans[table.starts[chosen[0]], 0])
-        raise in_line(table.text, at, f"cells of the type {name!r} with {max(size, 0)} points are not known")
-    key, ids = shape if size == ELEMENTS[shape].nodes else f"{shape}_of_{size}", cells.columns(0, 1, chosen)[:, 0]
-    return Cells(key, points.points_of(cells.columns(3, 3 + size, chosen), ids), np.ascontiguousarray(ids))
+        at = cells.place(int(chosen[0]))
+        raise in_line(cells.text, at, f"cells of the type {name!r} with {max(size, 0)} points are not known")
+    key, ids = shape if size == ELEMENTS[shape].nodes else f"{shape}_of_{size}", cells.integers(0, 1, chosen)[:, 0]
+    return Cells(key, points.points_of(cells.integers(3, 3 + size, chosen), ids), np.ascontiguousarray(ids))
 
 
 def _volume(points: Points, run: Cells) -> float:
@@ -119,5 +117,5 @@ def _volume(points: Points, run: Cells) -> float:
         return float(np.nan_to_num(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum())
 
 
-def _corners(where: Callable[[], Lines], chosen: Int64, order: Int64) -> Places:
-    return Places.of_text(where().columns(3, 3 + len(order), chosen)[:, order], "i8")
+def _corners(cells: IntegerLines, chosen: Int64, order: Int64) -> Places:
+    return Places.of_text(cells.columns(3, 3 + len(order), chosen)[:, order], "i8")

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, Lines, Numbering, Rows, Runs, alike, lines, rows, without
+from meshfix_cli.meshfile.tables import Int64, IntegerLines, Numbering, Runs, alike, integer_lines, rows, without
 from meshfix_cli.meshfile.text import Spans, in_line, integers
 
 _COMMENT = re.compile(rb"(?m)^[ \t]*#[^\n\r]*")
@@ -59,7 +59,7 @@ class _Mesh:
     end : int
     """
 
-    tables: dict[str, Lines | Rows] = field(default_factory=dict)
+    tables: dict[str, IntegerLines] = field(default_factory=dict)
     sets: dict[str, dict[str, Int64]] = field(default_factory=dict)
     n: int = 0
     points: Spans | None = None
@@ -109,7 +109,7 @@ def _sections(text: bytes) -> _Mesh:
         if name == "vertices":
             at = _read_vertices(mesh, text, at, count)
         elif name in ("elements", "boundary"):
-            mesh.tables[name] = _table(text, at, count)
+            mesh.tables[name] = integer_lines(text, at, count, "element")
             at = mesh.tables[name].end
         elif name in ("attribute_sets", "bdr_attribute_sets"):
             mesh.sets[name], at = _read_sets(text, at, count)
@@ -120,16 +120,6 @@ def _sections(text: bytes) -> _Mesh:
             raise in_line(text, len(text) - len(text[at:].lstrip()), "there are more numbers than announced")
     mesh.end = at
     return mesh
-
-
-def _table(text: bytes, at: int, count: int) -> Lines | Rows:
-    """Find the lines of elements, of which most meshes have one type."""
-    if count > 0:
-        kind = int(lines(text, at, 1, "element").integers(1, 2)[0, 0])
-        found = Rows.of(text, at, count, 2 + _TYPES[kind][1], 1) if kind in _TYPES else None
-        if found is not None:
-            return found
-    return lines(text, at, count, "element")
 
 
 def _integer(text: bytes, at: int) -> tuple[int, int]:
@@ -194,7 +184,7 @@ def _sizes(mesh: _Mesh) -> tuple[Int64, Int64]:
     return np.array([_TYPES[kind][1] for kind in range(len(_TYPES))])[types], types
 
 
-def _types(table: Lines | Rows) -> Int64:
+def _types(table: IntegerLines) -> Int64:
     types = table.integers(1, 2)[:, 0]
     unknown = np.flatnonzero((types < 0) | (types >= len(_TYPES)))
     if len(unknown):
@@ -256,5 +246,5 @@ def _refuse() -> Places:
     raise ReadError("has nodes of its own for each element, which would be those of others if it were renumbered")
 
 
-def _corners(table: Lines | Rows, size: int, here: Int64) -> Places:
+def _corners(table: IntegerLines, size: int, here: Int64) -> Places:
     return Places.of_text(table.columns(2, 2 + size, here), "i8")

@@ -14,11 +14,10 @@ from functools import partial
 
 import numpy as np
 
-from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, Lines, Numbering, Rows, Runs, alike, lines, without
+from meshfix_cli.meshfile.tables import Int64, IntegerLines, Numbering, Runs, alike, integer_lines, lines, without
 from meshfix_cli.meshfile.text import Spans, in_line
 
 _COMMENT = re.compile(rb"#[^\n\r]*")
@@ -46,21 +45,13 @@ def parse(data: bytes) -> Source:
     )
 
 
-def _tables(text: bytes, at: int, n: int, m: int) -> tuple[Spans, Lines | Rows, bool]:
-    """Find coordinates (n, 3, 2) and faces; tell whether there are other numbers behind them.
-
-    Most files have no others, and faces of one size; so nothing is left behind as many numbers as these have.
-    """
-    if 0 < 3 * n <= len(text) - at and len(spans := kernels.find_words(text, at, 3 * n)) == 3 * n:
-        end = int(spans[-1, 1])
-        size = kernels.scan_integers(text, end, 1)[0]
-        faces = Rows.of(text, end, m, 1 + int(size[0]), 0) if len(size) and size[0] > 0 else None
-        if faces is not None and faces.values[0, 0] == size[0] and not text[faces.end :].strip():
-            return spans.reshape(n, 3, 2), faces, False
+def _tables(text: bytes, at: int, n: int, m: int) -> tuple[Spans, IntegerLines, bool]:
+    """Find coordinates (n, 3, 2) and faces; tell whether there are other numbers behind them."""
     points = lines(text, at, n, "point")
-    table = lines(text, points.end, m, "face")
-    _check_end(text, table.end)
-    return points.columns(0, 3), table, _more(points, table)
+    faces = integer_lines(text, points.end, m, "face")
+    _check_end(text, faces.end)
+    more = (points.counts > 3).any() or (faces.counts > 1 + faces.integers(0, 1)[:, 0]).any()
+    return points.columns(0, 3), faces, bool(more)
 
 
 def _check_end(text: bytes, end: int) -> None:
@@ -71,7 +62,7 @@ def _check_end(text: bytes, end: int) -> None:
         raise in_line(text, len(text) - len(left), "there are more lines than announced")
 
 
-def _runs(faces: Lines | Rows, n: int) -> Runs:
+def _runs(faces: IntegerLines, n: int) -> Runs:
     runs, numbering, sizes = Runs(), Numbering(np.arange(n)), faces.integers(0, 1)[:, 0]
     for rows in alike(sizes):
         size = int(sizes[rows[0]])
@@ -82,10 +73,5 @@ def _runs(faces: Lines | Rows, n: int) -> Runs:
     return runs
 
 
-def _more(points: Lines, faces: Lines) -> bool:
-    """Whether there are numbers behind the coordinates, or behind the vertices of a face."""
-    return bool((points.counts > 3).any() or (faces.counts > 1 + faces.integers(0, 1)[:, 0]).any())
-
-
-def _corners(faces: Lines | Rows, size: int, rows: Int64) -> Places:
+def _corners(faces: IntegerLines, size: int, rows: Int64) -> Places:
     return Places.of_text(faces.columns(1, 1 + size, rows), "i8")

@@ -18,7 +18,17 @@ import numpy as np
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, Lines, Numbering, Runs, alike, lines, without
+from meshfix_cli.meshfile.tables import (
+    Int64,
+    IntegerLines,
+    Lines,
+    Numbering,
+    Runs,
+    alike,
+    integer_lines,
+    lines,
+    without,
+)
 from meshfix_cli.meshfile.text import Spans, in_line
 from meshfix_cli.meshfile.vtk.cells import TYPES
 
@@ -34,7 +44,7 @@ class _Zone:
 
     dimension: int = 0
     points: Lines | None = None
-    markers: list[tuple[str, Lines]] = field(default_factory=list)
+    markers: list[tuple[str, IntegerLines]] = field(default_factory=list)
 
     def coordinates(self) -> Spans:
         """(n, d, 2) int64."""
@@ -90,7 +100,7 @@ def _zones(text: bytes) -> Iterator[_Zone]:
             name = match[2].strip().decode("latin-1")
         elif keyword in (b"NELEM", b"MARKER_ELEMS"):
             sending = _SENDING.match(text, at)
-            table = lines(text, sending.end() if sending else at, _count(text, match), "element")
+            table = integer_lines(text, sending.end() if sending else at, _count(text, match), "element")
             zone.markers.append(("" if keyword == b"NELEM" else name or "?", table))
             at = behind = table.end
     if behind == at:
@@ -112,16 +122,16 @@ def _count(text: bytes, match: re.Match[bytes]) -> int:
     return int(words[0][:18])
 
 
-def _by_type(table: Lines) -> Iterator[tuple[tuple[str, int], Int64]]:
+def _by_type(table: IntegerLines) -> Iterator[tuple[tuple[str, int], Int64]]:
     """Give the types of elements, their name and size, and their rows."""
     types = table.integers(0, 1)[:, 0]
     for rows in alike(types):
         kind = TYPES.get(int(types[rows[0]]), ("", 0))
         if not kind[1]:
-            at = int(table.spans[table.starts[rows[0]], 0])
+            at = table.place(int(rows[0]))
             raise in_line(table.text, at, f"elements of the type {types[rows[0]]} are not known")
         yield kind, rows
 
 
-def _corners(table: Lines, size: int, rows: Int64) -> Places:
+def _corners(table: IntegerLines, size: int, rows: Int64) -> Places:
     return Places.of_text(table.columns(1, 1 + size, rows), "i8")

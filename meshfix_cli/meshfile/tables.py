@@ -23,7 +23,7 @@ from meshfix_cli.meshfile.text import Spans, in_line, integers_at, words
 
 Int64 = NDArray[np.int64]
 
-_CODES = -(2**62)  # below, integers stand for words
+CODES = -(2**62)  # below, integers stand for words
 _MOST_RUNS = 1000  # above, cells of a kind are gathered from all over the file
 
 
@@ -72,58 +72,9 @@ class Lines(NamedTuple):
             return self.spans[starts[0] : starts[-1] + last].reshape(len(starts), last, 2)
         return self.spans[starts[:, None] + np.arange(first, last)]
 
-    def integers(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Int64:
-        """Return the integers (k, last - first) that stand there."""
-        return integers_at(self.text, self.columns(first, last, rows))
-
-    def place(self, row: int) -> int:
-        """Return where a line begins."""
-        return int(self.spans[self.starts[row], 0])
-
-
-class Rows(NamedTuple):
-    """What stands for `Lines` where all are of as many integers: they are read at once, and found when asked for.
-
-    Attributes
-    ----------
-    text : bytes
-    begin, end : int
-        Where to look for the first word, and the offset behind the last.
-    values : (n, k) int64
-    """
-
-    text: bytes
-    begin: int
-    end: int
-    values: Int64
-
-    @classmethod
-    def of(cls, text: bytes, at: int, count: int, columns: int, column: int) -> Rows | None:
-        """Read the next integers; None: there are not as many, or those in a column are not all the same."""
-        if not 0 < count * columns <= len(text) - at:
-            return None
-        values, end, bad = kernels.scan_integers(text, at, count * columns)
-        if bad >= 0:
-            return None
-        table = values.astype(np.int64, copy=False).reshape(count, columns)
-        return cls(text, at, end, table) if (table[:, column] == table[0, column]).all() else None
-
-    @property
-    def counts(self) -> Int64:
-        """(n,) int64: how many words a row has."""
-        return np.full(len(self.values), self.values.shape[1])
-
-    def columns(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Spans:
-        """Return the spans (k, last - first, 2) of some words of some rows."""
-        return words(self.text, self.begin, self.values.size).reshape(*self.values.shape, 2)[rows, first:last]
-
-    def integers(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Int64:
-        """Return the integers (k, last - first) that stand there."""
-        return self.values[rows, first:last]
-
-    def place(self, row: int) -> int:
-        """Return where a row begins."""
-        return int(words(self.text, self.begin, row * self.values.shape[1] + 1)[-1, 0])
+    def integers(self, first: int, last: int) -> Int64:
+        """Return the integers (n, last - first) that stand there."""
+        return integers_at(self.text, self.columns(first, last))
 
 
 def lines(text: bytes, at: int, count: int, what: str = "line") -> Lines:
@@ -141,17 +92,21 @@ def lines(text: bytes, at: int, count: int, what: str = "line") -> Lines:
 
 
 class IntegerLines(NamedTuple):
-    """The integers of some lines, and what stands for words among them.
+    """The integers of some lines, which may have other words among them; their places are found when asked for.
 
     Attributes
     ----------
+    text : bytes
+    begin, end : int
+        Where to look for the first word, and the offset behind the last.
     values : (k,) int64
+        What stands for other words is below all integers of files: see `word_of`.
     starts : (n+1,) int64
         The number of the first value of each line, and of all values.
-    end : int
-        The offset behind the last word.
     """
 
+    text: bytes
+    begin: int
     values: Int64
     starts: Int64
     end: int
@@ -161,37 +116,42 @@ class IntegerLines(NamedTuple):
         """(n,) int64: how many words a line has."""
         return np.diff(self.starts)
 
-    def columns(self, first: int, last: int, rows: Int64) -> Int64:
-        """Return the values (k, last - first) of some lines, all of which have as many."""
-        if len(rows) and (np.diff(rows) == 1).all() and (self.counts[rows] == self.counts[rows[0]]).all():
-            begin, end = self.starts[rows[0]], self.starts[rows[-1] + 1]
-            return self.values[begin:end].reshape(len(rows), -1)[:, first:last]
-        return self.values[self.starts[:-1][rows][:, None] + np.arange(first, last)]
+    def columns(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Spans:
+        """Return the spans (k, last - first, 2) of some words of some lines."""
+        return self._places().columns(first, last, rows)
+
+    def words(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Int64:
+        """Return what stands for some words (k, last - first) of some lines; ReadError where a line has fewer."""
+        starts, ends = self.starts[:-1][rows], self.starts[1:][rows]
+        if (ends - starts < last).any():
+            self.columns(first, last, rows)  # which says where
+        each = int(ends[0] - starts[0]) if len(starts) else 0
+        if each and (np.diff(starts) == each).all() and ends[-1] - starts[-1] == each:
+            return self.values[starts[0] : ends[-1]].reshape(-1, each)[:, first:last]
+        return self.values[starts[:, None] + np.arange(first, last)]
+
+    def integers(self, first: int, last: int, rows: NDArray[Any] | slice = slice(None)) -> Int64:
+        """Return the integers (k, last - first) that stand there; ReadError where there is something else."""
+        found = self.words(first, last, rows)
+        if (found < CODES).any():
+            integers_at(self.text, self.columns(first, last, rows))  # which says what
+        return found
+
+    def place(self, row: int) -> int:
+        """Return where a line begins."""
+        places = self._places()
+        return int(places.spans[places.starts[row], 0])
+
+    def _places(self) -> Lines:
+        return Lines(self.text, *kernels.find_lines(self.text, self.begin, len(self.starts) - 1))
 
 
-def integer_lines(text: bytes, at: int, count: int, what: str, *names: int) -> IntegerLines:
-    """Read the integers of the next lines that have some words, where no places of these are needed.
-
-    Parameters
-    ----------
-    names : int
-        Columns that may hold words.
-
-    Raises
-    ------
-    ReadError
-        There are not as many lines as announced, or other words in them.
-    """
-    table = IntegerLines(*kernels.read_lines(text, at, count))
-    if not 0 <= count == len(table.starts) - 1:
+def integer_lines(text: bytes, at: int, count: int, what: str) -> IntegerLines:
+    """Read the next lines that have some words; ReadError where there are not as many as a file announces."""
+    values, starts, end = kernels.read_lines(text, at, count)
+    if not 0 <= count == len(starts) - 1:
         raise ReadError(f"is truncated: {counted(count, what, what + 's')} announced, and not all are there")
-    words = np.flatnonzero(table.values < _CODES)
-    if len(names) == 1 and np.array_equal(words, table.starts[:-1] + names[0]):
-        return table
-    columns = words - table.starts[np.searchsorted(table.starts, words, side="right") - 1]
-    if len(wrong := words[~np.isin(columns, names)]):
-        integers_at(text, lines(text, at, count, what).spans[wrong])
-    return table
+    return IntegerLines(text, at, values, starts, end)
 
 
 def word_of(code: int) -> str:

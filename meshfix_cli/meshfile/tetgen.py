@@ -18,7 +18,7 @@ import numpy as np
 from meshfix_cli.errors import ReadError, naming
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Lines, Numbering, Runs, lines, without
+from meshfix_cli.meshfile.tables import CODES, IntegerLines, Numbering, Runs, integer_lines, lines, without
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 from meshfix_cli.meshfile.together import Together
 
@@ -53,22 +53,26 @@ def parse(_: bytes, path: Path | None) -> Source:
 
 def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple[Source, InPlace]:
     with naming(".node"):
-        (dimension, *_), table = _table(nodes, 2)
+        text, at, (count, dimension, *_) = _head(nodes, 2)
+        listed = lines(text, at, count, "point")
+        _check_end(text, listed.end)
         if dimension not in (2, 3):
             raise ReadError(f"its points have {dimension} coordinates")
-        coordinates = Places.of_text(table.columns(1, 1 + dimension))
-        points, numbering = coordinates.read(nodes), Numbering(table.integers(0, 1)[:, 0])
+        coordinates = Places.of_text(listed.columns(1, 1 + dimension))
+        points, numbering = coordinates.read(nodes), Numbering(listed.integers(0, 1)[:, 0])
     runs = Runs()
     with naming(".ele"):
-        (corners, attributes, *_), table = _table(elements, 2)
+        (corners, attributes), table = _integers(elements, 2)
         kind = _TYPES.get((dimension, corners))
         if kind is None:
             raise ReadError(f"its elements have {corners} nodes in {dimension} dimensions")
         rows = table.integers(0, 1 + corners)
         labels = {}
         if attributes > 0:
-            column = table.columns(1 + corners, 2 + corners)[:, 0]
-            labels[_REF] = numbers_at(table.text, column, np.dtype("f8"))
+            labels[_REF] = table.words(1 + corners, 2 + corners)[:, 0]
+            if (labels[_REF] < CODES).any():  # they may be any numbers
+                column = table.columns(1 + corners, 2 + corners)[:, 0]
+                labels[_REF] = numbers_at(table.text, column, np.dtype("f8"))
         cells = Cells(kind, numbering.points_of(rows[:, 1:], rows[:, 0]), rows[:, 0])
         runs.add(cells, partial(_corners, table, corners, len(nodes)), labels)
     for suffix, data in facets.items():
@@ -79,26 +83,36 @@ def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple
     return Source(points, runs.cells, None, runs.arrays, (_REF,) * bool(labels), untold=untold), layout
 
 
-def _table(data: bytes, counts: int) -> tuple[list[int], Lines]:
-    """Return what the first line tells, but for the number of lines, and these."""
+def _head(data: bytes, counts: int) -> tuple[bytes, int, list[int]]:
+    """Return the text without comments, the offset behind its first line, and what that tells."""
     text = without(data, _COMMENT, b"#")
     head = lines(text, 0, 1)
     values = integers_at(text, head.spans).tolist()
     if len(values) < counts:
         raise in_line(text, head.end, "the first line does not tell how many lines and columns there are")
-    table = lines(text, head.end, values[0])
-    if left := text[table.end :].lstrip():
+    return text, head.end, [*values, 0][: counts + 1]  # the last of them may be left out
+
+
+def _integers(data: bytes, counts: int) -> tuple[list[int], IntegerLines]:
+    """Return what the first line tells behind the number of lines, and these."""
+    text, at, (count, *others) = _head(data, counts)
+    table = integer_lines(text, at, count, "line")
+    _check_end(text, table.end)
+    return others, table
+
+
+def _check_end(text: bytes, end: int) -> None:
+    if left := text[end:].lstrip():
         raise in_line(text, len(text) - len(left), "there are more lines than announced")
-    return [*values[1:], 0, 0], table
 
 
-def _corners(table: Lines, count: int, before: int) -> Places:
+def _corners(table: IntegerLines, count: int, before: int) -> Places:
     return Places.of_text(table.columns(1, 1 + count) + before, "i8")
 
 
 def _add_facets(runs: Runs, data: bytes, kind: str, corners: int, numbering: Numbering) -> None:
     """Take the facets that have a marker, which are boundaries and interfaces: others may be inside."""
-    (markers, *_), table = _table(data, 1)
+    (markers,), table = _integers(data, 1)
     if markers < 1:
         return
     marks = table.integers(1 + corners, 2 + corners)[:, 0]

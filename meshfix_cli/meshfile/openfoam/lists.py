@@ -79,8 +79,10 @@ class File:
             value, end = integers(self.data.replace(b"}", b" "), begin, 1)
             return np.full(count, value[0]), self._closed(end, b"}")
         if not self.binary:
-            values, end = integers(self._text, begin, count)
-            return values, self._closed(end)
+            short, end, bad = kernels.scan_integers(self.data, begin, count)
+            if bad >= 0:  # the last may stand beside its bracket
+                short, end = integers(self._text, begin, count)
+            return short.astype(np.int64, copy=False), self._closed(end)
         values = np.frombuffer(self.data, f"{self.order}i{self.label}", self._claimed(count, begin, self.label), begin)
         return values.astype(np.int64), self._closed(begin + values.nbytes)
 

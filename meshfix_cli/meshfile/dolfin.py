@@ -36,6 +36,7 @@ _TYPES = {
     "hexahedron": ("hexahedron", [0, 1, 3, 2, 4, 5, 7, 6]),
 }  # fmt: skip
 _DOMAINS = "dolfin:domains"
+_MOST_BLANKS = 99  # between a name, the = and a quote
 
 
 def parse(data: bytes) -> Source:
@@ -121,7 +122,10 @@ def _rows(text: bytes, at: int, section: str, names: list[str]) -> tuple[Spans, 
 def _keys(raw: NDArray[np.uint8], at: Int64) -> NDArray[np.uint16]:
     """Return numbers (...) that tell names apart, their last two letters: those before the = that stands there."""
     at = at.copy()
-    while (between := (raw[at] == ord("=")) | (raw[at] <= ord(" "))).any() and at.min() > 0:
+    for _ in range(_MOST_BLANKS):
+        between = (raw[at] == ord("=")) | (raw[at] <= ord(" "))
+        if not between.any() or not at.min():
+            break
         at -= between
     before = np.maximum(raw[at - 1], ord(" ")).astype(np.uint16)
     return (before << np.uint16(8)) | raw[at]

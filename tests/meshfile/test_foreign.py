@@ -54,7 +54,7 @@ def test_ucd_is_read_under_the_name_of_abaqus(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "text", "words"),
     [
-        ("a.su2", "NZONE= 2\nIZONE= 1\nNDIME= 2\nNELEM= 0\n", "several zones"),
+        ("a.post", "$COOR\n1 0 0 0\n$COOR\n2 1 0 0\n$FIN\n", "several blocks of nodes"),
     ],
 )  # fmt: skip
 def test_what_would_be_misread_is_refused(name: str, text: str, words: str, tmp_path: Path) -> None:

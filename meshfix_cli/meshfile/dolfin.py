@@ -12,6 +12,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +120,7 @@ def _rows(text: bytes, at: int, section: str, names: list[str]) -> tuple[Spans, 
     return found + np.array([start + 1, start]), end
 
 
-def _keys(raw: NDArray[np.uint8], at: Int64) -> NDArray[np.uint16]:
+def _keys(raw: NDArray[np.uint8], at: Int64) -> NDArray[Any]:
     """Return numbers (...) that tell names apart, their last two letters: those before the = that stands there."""
     at = at.copy()
     for _ in range(_MOST_BLANKS):

@@ -1,7 +1,7 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
 Source: FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user documentation, "Build a
-mesh"; SU2 documentation, "Mesh file"; "MSC Nastran Quick Reference Guide".
+mesh".
 """
 
 from __future__ import annotations
@@ -47,26 +47,16 @@ def misread(data: bytes, form: Format) -> str | None:
 
 def _several(data: bytes, form: Format) -> str | None:
     """Say that there are several meshes."""
-    for what, pattern in _ONCE.get(form.name, ()):
-        if len(re.findall(pattern, data)) > 1:
-            return f"holds several {what}, and one mesh is read: give each a file of its own"
-    return None
+    what, pattern = _ONCE.get(form.name, ("", b"(?!)"))
+    several = len(re.findall(pattern, data)) > 1
+    return f"holds several {what}, and one mesh is read: give each a file of its own" if several else None
 
 
 # What stands once in a file of one mesh: of several, meshio reads one, or lays them over one another.
 _ONCE = {
-    "netgen": [("meshes", rb"(?m)^\s*points\s*$")],
-    "permas": [("blocks of nodes", rb"(?mi)^\s*\$COOR\b")],
-    "su2": [("zones", rb"(?m)^\s*(?:NZONE\s*=\s*(?:[2-9]|1\d)|IZONE\s*=)"), ("zones", rb"(?m)^\s*NPOIN\s*=")],
+    "netgen": ("meshes", rb"(?m)^\s*points\s*$"),
+    "permas": ("blocks of nodes", rb"(?mi)^\s*\$COOR\b"),
 }
-
-
-def missing_cells(data: bytes, form: Format, cells: int) -> str | None:
-    """Say that a file announces more cells than were read; meshio reads some truncated files without a word."""
-    found = re.search(rb"NELEM\s*=\s*(\d+)", data) if form.name == "su2" else None
-    if found and cells < int(found[1]):
-        return f"is truncated: it announces {int(found[1]):,} cells and holds {cells:,}"
-    return None
 
 
 def words_lost(before: bytes, after: bytes) -> list[str]:

@@ -12,8 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, naming
 from meshfix_cli.meshfile.source import Cells, Source
@@ -67,7 +69,7 @@ def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple
         if kind is None:
             raise ReadError(f"its elements have {corners} nodes in {dimension} dimensions")
         rows = table.integers(0, 1 + corners)
-        labels = {}
+        labels: dict[str, NDArray[Any]] = {}
         if attributes > 0:
             labels[_REF] = table.words(1 + corners, 2 + corners)[:, 0]
             if (labels[_REF] < CODES).any():  # they may be any numbers

@@ -49,7 +49,6 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
         _refuse(foreign.misread(data, form))
         _refuse(_several_zones(path) if form.name == "cgns" else None)
         mesh = meshio.read(path, file_format=form.reader)
-        _refuse(foreign.missing_cells(data, form, sum(len(block.data) for block in mesh.cells)))
         return _source(mesh, data, form)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -158,7 +161,15 @@ def of_hdf5(path: Path, **stored: Any) -> None:
 
 
 def vtk_writes(path: Path) -> None:
-    writers = pytest.importorskip("vtkmodules.vtkIOExodus")  # that of the whole package is another, and crashes
+    """Write in a process of its own: where the whole of VTK has been imported, its writer is another, and crashes."""
+    pytest.importorskip("vtkmodules")
+    command = "import sys, files_exodus; files_exodus.by_vtk(sys.argv[1])"
+    paths = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    subprocess.run([sys.executable, "-c", command, str(path)], env=paths, check=True)
+
+
+def by_vtk(path: str) -> None:
+    from vtkmodules import vtkIOExodus as writers
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkMultiBlockDataSet, vtkUnstructuredGrid
@@ -172,7 +183,7 @@ def vtk_writes(path: Path) -> None:
     blocks = vtkMultiBlockDataSet()
     blocks.SetBlock(0, mesh)
     writer = writers.vtkExodusIIWriter()
-    writer.SetFileName(str(path))
+    writer.SetFileName(path)
     writer.SetStoreDoubles(1)
     writer.SetInputData(blocks)
     writer.Write()

@@ -9,6 +9,7 @@ from meshfix_cli.errors import ReadError
 
 # Distance from the plane, relative to the size of the mesh, that text with seven digits or float32 may leave.
 FLAT = 1e-6
+FAR = 1e3  # median distances from the middle, beyond which a vertex was thrown away rather than meshed
 
 
 def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np.float64]:
@@ -28,6 +29,7 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     ReadError
         The points do not lie in one plane, or lie on one line.
     """
+    points, epsilon = _drawn_near(points, epsilon)
     size = float(np.ptp(points, axis=0).max())
     flat = FLAT + 4 * epsilon * float(np.abs(points).max()) / size
     spread = np.ptp(points, axis=0)
@@ -42,3 +44,18 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     if np.ptp(centred @ axes[:, 1]) <= flat:
         raise ReadError("all vertices lie on one line")
     return np.stack([axes[:, 2], np.cross(normal_vector, axes[:, 2])])
+
+
+def _drawn_near(points: NDArray[np.float64], epsilon: float) -> tuple[NDArray[np.float64], float]:
+    """Return the points with what is far away brought near in its direction, and the relative rounding of these.
+
+    Else one vertex would hide from the tolerance what the others form, and from the fit which plane they lie in.
+    """
+    middle = points[np.argmin(np.linalg.norm(points - np.median(points, axis=0), axis=1))]
+    distance = np.linalg.norm(points - middle, axis=1)
+    usual = float(np.median(distance))
+    if not 0.0 < FAR * usual < distance.max():
+        return points, epsilon
+    scale = distance + usual
+    rounding = epsilon * float((np.abs(points).max(axis=1) / scale).max())
+    return (points - middle) / scale[:, None], rounding

@@ -294,27 +294,32 @@ def shape_energy(
     points: Float64,
     simplices: Int32,
     corners: Float64,
+    owners: Int32,
     free: int,
     goal: float,
     floor: float,
     measure: float,
     weight: float,
+    sharpness: float,
     threads: int,
 ) -> tuple[float, Float64]:
     """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge.
 
-    Simplices that are corners of elements have their weights in `corners` (m,), others 0; (0,): none is a corner.
+    Simplices that are corners of elements have their weights in `corners` (m,), others 0; (0,): none is a corner. The
+    elements of the simplices are `owners` (m,), one behind the other; (0,) will do where the sharpness is 0.
     """
 
 def shaped(
     points: Float64,
     simplices: Int32,
     corners: Float64,
+    owners: Int32,
     free: int,
     goal: float,
     floor: float,
     measure: float,
     weight: float,
+    sharpness: float,
     iterations: int,
     threads: int,
 ) -> Float64:

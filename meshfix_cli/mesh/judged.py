@@ -50,10 +50,14 @@ class Judged:
         """Whether all elements of the mesh are simplices of one type."""
         return self._mesh.simplicial
 
+    @property
+    def rows(self) -> NDArray[np.integer]:
+        """Their rows (k,)."""
+        return np.arange(len(self), dtype=np.int32) if self._rows is None else self._rows
+
     def without(self, positions: NDArray[np.integer]) -> Judged:
         """Return the others."""
-        rows = np.arange(len(self), dtype=np.int32) if self._rows is None else self._rows
-        return Judged(self._mesh, np.delete(rows, positions)) if len(positions) else self
+        return Judged(self._mesh, np.delete(self.rows, positions)) if len(positions) else self
 
     def vertices(self, which: NDArray[np.integer] | NDArray[np.bool_]) -> NDArray[np.int32]:
         """Return the vertices (any shape) of some elements, by their positions or a mask (k,)."""

@@ -22,6 +22,7 @@ from meshfix_cli.solve.region import Region
 Array = NDArray[np.float64]
 
 WEIGHT = 0.5  # of the measure in the energy: large ones make valid sooner, small ones make better shapes
+REGION_PATIENCE = 5  # minimisations without fewer inverted elements after which a larger region is tried
 MINIMISATIONS = 30  # with one target
 ITERATIONS = 300  # of one minimisation
 SMALLEST_TARGET = 0.05  # of the median: no target of a simplex that the embedding makes flat is smaller
@@ -114,6 +115,36 @@ def minimisations(
         yield from region.minimise(embedded, sizes, effort)  # its positions are drawn into reach
 
 
+def minimisations_in_regions(
+    regions: tuple[int | None, ...],
+    max_move: float,
+    threads: int,
+    stars: kernels.Connectivity,
+    points: Array,
+    start: Array,
+    free: NDArray[np.bool_],
+    broken: NDArray[np.bool_],
+) -> Iterator[Array]:
+    """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
+    reach = Reach(start, max_move)
+    for rings in regions:
+        near = free if rings is None else free & stars.grown(broken, rings).view(bool)
+        if rings is not None and 2 * near.sum() > free.sum():
+            return  # as good as the whole mesh
+        efforts = (QUICK, THOROUGH) if rings is None else (QUICK,)
+        fewest, waited = len(stars.simplices), 0
+        for moved in minimisations(points, stars, near, reach, threads, efforts):
+            points = moved
+            yield points
+            left = len(kernels.check(points, stars.simplices, threads)[0])
+            waited = 0 if left < fewest else waited + 1
+            fewest = min(fewest, left)
+            if rings is not None and waited == REGION_PATIENCE:
+                break
+        if rings is None:
+            yield from drawn_into_reach(stars, near, reach, threads)
+
+
 def drawn_into_reach(
     mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int
 ) -> Iterator[Array]:
@@ -160,6 +191,14 @@ def minimisations_to(
         yield from (moved for effort in (QUICK, THOROUGH) for moved in region.minimise(points, targets, effort))
     else:
         yield from region.approach(points, targets)
+
+
+def evened(points: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int, iterations: int) -> Array:
+    """Return valid points (n, d) on the way from others to where the energy of the uniform target is smallest.
+
+    The parameters are those of `minimisations`.
+    """
+    return _Region(mesh, free, Reach(points), threads).even(points, iterations)
 
 
 def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int = 1) -> Array:
@@ -233,6 +272,12 @@ class _Region(Region):
                 return
             sigma = max(1 - after / before, effort.least_share)
             eps = _next_eps(eps, problem.min_det, sigma)
+
+    def even(self, valid: Array, iterations: int) -> Array:
+        """Return valid points on the way from others to where the energy of the uniform target is smallest."""
+        problem = self._problem(valid, self.uniform(valid))
+        problem.minimise(LAST_EPS, WEIGHT, iterations, 0.0, until_valid=False)
+        return self.retreated(valid, self._moved(valid, problem), -math.inf, self.threads)
 
     def draw(self, valid: Array) -> Iterator[Array]:
         """Yield the points of a valid mesh once they are drawn into reach; the pull rises until all of them are."""

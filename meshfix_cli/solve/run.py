@@ -16,23 +16,22 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.solve.records import SweepRecord
-from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, Goal, shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, SHARPNESS, Goal, shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
+    from meshfix_cli.solve.compared import Compared
     from meshfix_cli.solve.team import Team
 
 GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone, and it may lose no more
 ANGLE_STEPS = 2.0**32  # of a radian
-FLOOR = 1  # percentile of the smallest angles; those up to `LIFT` degrees above it count as the few that are worse
-LIFT = 3.0
+FLOOR, LIFT = 1, 3.0  # percentile of the smallest angles; up to so many degrees above it they are the few worse ones
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
 RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
 RAISE_PATIENCE = 2
 ROUND_RISE = 0.05  # degrees by which the smallest angle must rise for another round of "best"
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
-REGION_PATIENCE = 5  # minimisations without fewer inverted elements after which a larger region is tried
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
 EASY = 3  # sweeps: a tangle that took more, and of which at least `MANY` of the elements were inverted, was a hard one
 MANY = 0.25
@@ -122,6 +121,7 @@ class Run:
         self.first = (self.points, self.record, self._rank())
         self.best: _Start | None = self.first
         self.fewest, self.largest = self._rank()[0], self.measure
+        self.compared: Compared | None = None
         self.only_invalid = only_invalid
         self.broken = self._broken()
         self.near = self.free & self.broken if only_invalid else self.free
@@ -131,6 +131,7 @@ class Run:
         self.kept: tuple[Array, SweepRecord, float] | None = None
         self.lost = False  # what the last minimisation of the shape began with
         self.shaped = False  # since the smallest angle was raised
+        self.uneven = False  # for no reason, maybe: it was hard to untangle or to smooth
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
         self.untangling = 0  # sweeps
         self.count = self.team.total(int(self.own.sum()))  # of what can be mended, in all processes
@@ -147,7 +148,7 @@ class Run:
 
     def enter(self, phase: Phase) -> bool:
         """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
-        if self.mendable.simplicial if phase.elements else phase.layers and not self.mendable.simplicial:
+        if phase.elements is self.mendable.simplicial or (phase.layers and not self.mendable.simplicial):
             return False
         if phase.smooths:
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
@@ -176,6 +177,8 @@ class Run:
             return self._towards_reference(phase)
         if phase.embeds:
             return self._another_start()
+        if phase.shapes == "even":
+            return self._even()
         if phase.shapes:
             return self._shape(phase)
         if not phase.moves:
@@ -255,8 +258,8 @@ class Run:
 
     def meets(self, degrees: float) -> bool:
         """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-        free = Judged(self.stars).without(self.input.stuck(self.threads))
-        return self._least(free.angles(self.points, self.threads)) >= math.radians(degrees)
+        free = Judged(self.stars).without(self.input.stuck(self.threads)).angles(self.points, self.threads)
+        return self._least(free) >= math.radians(degrees)
 
     def go_back(self, untangling: bool) -> bool:
         """Return to the best positions; False: they are the last.
@@ -270,11 +273,16 @@ class Run:
         return self._return_to(points, record)
 
     def _return_to(self, points: Array, record: SweepRecord) -> bool:
+        if goes := self._go_to(points):
+            self.record = replace(record, phase="best", moved=0, seconds=0.0)
+        return goes
+
+    def _go_to(self, points: Array) -> bool:
         if points is self.points:
             return False
         self.points = points
         self._check()
-        self.record = replace(record, phase="best", moved=0, seconds=0.0)
+        self.record = replace(self._record("best", self.record.sweep, 0), seconds=0.0)
         return True
 
     def _check(self) -> None:
@@ -326,11 +334,12 @@ class Run:
                 states = _due(near)
             if phase.only_invalid and move in (Move.UNTANGLE_HEIGHTS, Move.UNTANGLE_COEFFICIENTS):
                 states = _due(near & (self._broken() | self._grown(self.changed, 1)))
-            yield self._relocated(self.points, move, states)
+            floor = self._min_sine2(self.mendable) if move is Move.MEAN_RATIO else None
+            yield self._relocated(self.points, move, states, floor)
 
     def _another_start(self) -> Iterator[Array]:
         """Yield the points with those near by in the graph's embedding, as far as they may go."""
-        self.rival, self.best = self.best, None
+        self.rival, self.best, self.uneven = self.best, None, True
         self.fewest, self.largest = self.count, -math.inf
 
         def compute(stars: kernels.Connectivity, points: Array, start: Array, near: Mask) -> Iterator[Array]:
@@ -348,13 +357,44 @@ class Run:
         smallest = self._least(angles)
         self.kept = self.points, self.record, smallest
         goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
-        floor = math.degrees(smallest) if phase.shapes == "lost" else 0.0
-        aims = Goal(goal, floor, max(self.min_measure, 0.0))
+        floor = math.degrees(smallest) if phase.shapes in ("lost", "sharp") else 0.0
+        sharpness = SHARPNESS if phase.shapes == "sharp" else 0.0
+        most = FEW_ITERATIONS if phase.elements and phase.shapes == "first" else ITERATIONS
+        aims = Goal(goal, floor, max(self.min_measure, 0.0), sharpness)
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
-            yield shaped(points, stars, free, aims, self.threads, FEW_ITERATIONS if phase.elements else ITERATIONS)
+            yield shaped(points, stars, free, aims, self.threads, most)
 
         yield from self.team.of_whole(compute, self.points, self._smoothed(phase))
+
+    def _even(self) -> Iterator[Array]:
+        """Yield the points with even sizes and then the best shape, if smallest and mean are larger."""
+        if self.max_move < math.inf or self.left or not self.uneven:
+            return
+        from meshfix_cli.solve import even
+
+        angles = self._angles(self.points)
+        total, smallest = self.team.total(self._steps(np.sin(angles))), math.sin(self._least(angles))
+        mean = total / ANGLE_STEPS / self.count
+        aims = Goal(math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT, 0.0, max(self.min_measure, 0.0))
+        compute = partial(even.evened_where_poor, smallest, mean, aims, self.threads)
+        for points in self.team.of_whole(compute, self.points, self.free):
+            there = self._angles(points)
+            if math.sin(self._least(there)) > smallest and self.team.total(self._steps(np.sin(there))) > total:
+                yield points
+
+    def compare(self) -> bool:
+        """Take the mesh for a candidate for the last one; whether something in it was drawn back."""
+        if self.left or self.mendable.simplicial:
+            return False
+        from meshfix_cli.solve.compared import Compared  # the formulas of metrics, which others do not need
+
+        self.compared = self.compared or Compared(self.input, self.mendable, self.own, self.team, self.threads)
+        return self._go_to(self.compared.add(self.points, self._of))
+
+    def take_compared(self) -> bool:
+        """Go to the best candidate; False: it is the last mesh, or there is none."""
+        return self.compared is not None and self._go_to(self.compared.best)
 
     def _goes_on(self, phase: Phase) -> bool:
         """Whether a phase of smoothing has something to do after those before."""
@@ -364,6 +404,8 @@ class Run:
         if phase.shapes == "lost" and not self.lost:
             return False
         if phase.shapes == "risen" and not self._has_risen():
+            return False
+        if phase.shapes == "sharp" and self.compared is not None and self.compared.stalls():
             return False
         self.shaped = self.shaped or phase.shapes is not None
         return True
@@ -393,6 +435,7 @@ class Run:
         well = self._least(angles) >= self.threshold and not (self.many and self.untangling > EASY)
         if well and phase.until == "threshold":
             return
+        self.uneven = True
         while True:
             below, smallest = self.team.total(int((angles < goal)[self.own].sum())), self._least(angles)
             rises = below < fewest or smallest > largest + math.radians(GOAL_RISE)
@@ -451,37 +494,7 @@ class Run:
         return self.team.of_whole(compute, self.points, self.first[0], *reference, self.free)
 
     def _minimisations(self, phase: Phase) -> Iterator[Array]:
-        compute = partial(_minimisations, phase.rings, self.max_move, self.threads)
+        from meshfix_cli.solve.foldover import minimisations_in_regions
+
+        compute = partial(minimisations_in_regions, phase.rings, self.max_move, self.threads)
         return self.team.of_whole(compute, self.points, self.first[0], self.free, self._broken())
-
-
-def _minimisations(
-    regions: tuple[int | None, ...],
-    max_move: float,
-    threads: int,
-    stars: kernels.Connectivity,
-    points: Array,
-    start: Array,
-    free: Mask,
-    broken: Mask,
-) -> Iterator[Array]:
-    """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
-    from meshfix_cli.solve.foldover import QUICK, THOROUGH, Reach, drawn_into_reach, minimisations
-
-    reach = Reach(start, max_move)
-    for rings in regions:
-        near = free if rings is None else free & stars.grown(broken, rings).view(bool)
-        if rings is not None and 2 * near.sum() > free.sum():
-            return  # as good as the whole mesh
-        efforts = (QUICK, THOROUGH) if rings is None else (QUICK,)
-        fewest, waited = len(stars.simplices), 0
-        for moved in minimisations(points, stars, near, reach, threads, efforts):
-            points = moved
-            yield points
-            left = len(kernels.check(points, stars.simplices, threads)[0])
-            waited = 0 if left < fewest else waited + 1
-            fewest = min(fewest, left)
-            if rings is not None and waited == REGION_PATIENCE:
-                break
-        if rings is None:
-            yield from drawn_into_reach(stars, near, reach, threads)

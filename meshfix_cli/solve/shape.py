@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 
 ITERATIONS = 100  # of "best"
 FEW_ITERATIONS = 20  # of the default
+SHARPNESS = 15.0  # of their judgement: see kernels/moves/shape.hpp
 WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
 
 
@@ -30,11 +31,14 @@ class Goal:
         Degrees; smaller angles count much more.
     measure : float
         Model units; no measure gets smaller.
+    sharpness : float
+        0: all corners of an element count the same; the larger, the more do the worst ones.
     """
 
     angle: float
     floor: float = 0.0
     measure: float = 0.0
+    sharpness: float = 0.0
 
 
 def shaped(
@@ -63,13 +67,18 @@ def shaped(
     region = Region(mesh, free)
     moved = points.copy()
     moved[region.moving] = kernels.shaped(
-        points[region.vertices], region.simplices, _corners(mesh, region), len(region.moving), goal.angle, goal.floor,
-        goal.measure, WEIGHT, iterations, threads,
+        points[region.vertices], region.simplices, corner_weights(mesh, region), _owners(mesh, region),
+        len(region.moving), goal.angle, goal.floor, goal.measure, WEIGHT, goal.sharpness, iterations, threads,
     )  # fmt: skip
     return region.retreated(points, moved, goal.measure, threads)
 
 
-def _corners(mesh: kernels.Connectivity, region: Region) -> Array:
+def corner_weights(mesh: kernels.Connectivity, region: Region) -> Array:
     """Return the weights (s,) of scaled Jacobians, 0 for whole simplices; (0,) where all are."""
     weights = np.array([one.shape.weight if len(one.shape.simplices) > 1 else 0.0 for one in JUDGED])
     return np.empty(0) if mesh.simplicial else weights[mesh.codes[mesh.owners[region.rows]]]
+
+
+def _owners(mesh: kernels.Connectivity, region: Region) -> NDArray[np.int32]:
+    """Return the elements (s,) of the simplices; (0,) where they are these."""
+    return np.empty(0, dtype=np.int32) if mesh.simplicial else np.ascontiguousarray(mesh.owners[region.rows])

@@ -17,6 +17,7 @@ MOST_PASSES = 1_000_000
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for plane and solid meshes
 SMOOTHING = "smoothing"
 ROUNDS = 8  # of "best", at most, after the first
+TURNS, RATIO_SWEEPS = 4, 6  # of "best" where elements are not all simplices
 MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold
 RINGS = (4,)  # around inverted elements in which the work begins
 REGIONS = (0, 2, 4, 8, None)  # rings around inverted elements that sweeps take in, where only those may move
@@ -71,16 +72,22 @@ class Phase:
     embeds : bool
         One sweep that puts all vertices of the region at the means of their neighbours at once. It is another start,
         for meshes that Laplacian sweeps did not mend; the next phase from the best mesh takes the better one.
-    shapes : {"first", "lost", "risen"}, optional
+    shapes : {"first", "lost", "risen", "even", "sharp"}, optional
         One minimisation of the shape of all elements at once, from a valid mesh. "lost": from where the last one began,
-        if the smallest angle is smaller than there, with that held; "risen": if it has risen since the last one began.
+        if the smallest angle is smaller than there, with that held; "risen": if it has risen since the last one began;
+        "even": where the phase before had something to do or untangling took another start, from where the
+        foldover-free energy makes the sizes even, if that is better; "sharp": elements are judged by
+        their worst corners, and the smallest quality is held.
     to_reference : str
         Of phases without moves, the function of `towards.py` that gives the points after each sweep. Smoothing that
         has one takes the place of the other, where there is a reference or layers were followed.
     layers : bool
         The function is that of `layers.py`, which makes up a reference.
-    elements : bool
-        For meshes of other elements than simplices alone.
+    elements : bool or None
+        For meshes of other elements than simplices alone; False: of simplices alone; None: of any.
+    compares : bool
+        Where elements are not all simplices, the last mesh is the best one of those after such phases, of which no
+        figure is below those after the first.
     """
 
     name: str
@@ -91,10 +98,11 @@ class Phase:
     from_best: bool = False
     rings: tuple[int | None, ...] = ()
     embeds: bool = False
-    shapes: Literal["first", "lost", "risen"] | None = None
+    shapes: Literal["first", "lost", "risen", "even", "sharp"] | None = None
     to_reference: Literal["", "follow", "mend", "approach"] = ""
     layers: bool = False
-    elements: bool = False
+    elements: bool | None = None
+    compares: bool = False
 
     @property
     def smooths(self) -> bool:
@@ -159,6 +167,14 @@ _RAISE = Phase(f"{SMOOTHING} the worst", (Move.RAISE_SMALLEST,), MOST_PASSES, un
 _HELD = replace(_SHAPE, name=f"{SMOOTHING} all at once, the worst held", shapes="lost")
 _BEST = (_SHAPE, _RAISE, _HELD, _RAISE, *(replace(_HELD, shapes="risen"), _RAISE) * ROUNDS)
 
+# Where elements are not all simplices: their energy has many valleys, out of which sweeps for the mean ratios lead.
+_EVEN = Phase(f"{SMOOTHING} to even sizes", max_sweeps=1, until="settled", shapes="even", elements=True)
+_RATIOS = Phase(
+    f"{SMOOTHING} by mean ratios", (Move.MEAN_RATIO,), RATIO_SWEEPS, until="settled", elements=True, compares=True
+)
+_SHARP = replace(_SHAPE, compares=True, elements=True, shapes="sharp")
+_TURNS = (_RATIOS, *(_SHARP, _RATIOS) * TURNS)
+
 
 def plan(
     strategy: str, smooth: Smooth = SMOOTH, only_invalid: bool = False, to_reference: bool = False
@@ -200,10 +216,13 @@ def plan(
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), PASSES, until="settled", from_best=True)
     if only_invalid and smooth == 0:
         return (*untangling, _BACK)
+    more = () if only_invalid else (replace(_SHAPE, rings=RINGS, elements=True), _MORE, _EVEN)
     if smooth == "best":
-        return (*untangling, passes, replace(_MORE, until="goal"), *_BEST)
+        default = tuple(replace(phase, elements=True) for phase in (replace(passes, rings=RINGS), *more))
+        first = (*default[:-1], replace(default[-1], compares=True))
+        simplicial = replace(passes, elements=False), replace(_MORE, until="goal", elements=False)
+        return (*untangling, *first, *simplicial, *_BEST, *_TURNS)
     if smooth == "auto":
-        more = () if only_invalid else (replace(_SHAPE, rings=RINGS, elements=True), _MORE)
         return (*untangling, replace(passes, rings=RINGS), *more)
     return (*untangling, replace(passes, max_sweeps=smooth))
 

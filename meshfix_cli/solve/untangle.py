@@ -108,7 +108,14 @@ def steps(
             if stalls and waited == PATIENCE * max(1, len(phase.moves)):
                 break
             run.clock = time.perf_counter()
+        if phase.compares:
+            if run.compared is None and run.take_back():  # as the default ends
+                yield run.mesh, run.record
+            if run.compare():
+                yield run.mesh, run.record
     if run.choose() or run.take_back():
+        yield run.mesh, run.record
+    if run.take_compared():
         yield run.mesh, run.record
     lost = run.record.rank > run.first[1].rank or (to_the_ceiling and run.first[1].inverted == 0 and not run.gained())
     if lost and run.go_back(untangling=False):

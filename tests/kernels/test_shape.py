@@ -13,8 +13,8 @@ from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.solve.region import Region
 from meshfix_cli.solve.shape import Goal, shaped
 
-GOAL = (30.0, 12.0, 0.0, 1.5)  # degrees, degrees, measure, weight
-NO_CORNERS = np.empty(0)
+GOAL = (30.0, 12.0, 0.0, 1.5, 0.0)  # degrees, degrees, measure, weight, sharpness
+NO_CORNERS = np.empty(0), np.empty(0, dtype=np.int32)
 
 
 def region_of(mesh: Mesh) -> tuple[np.ndarray, Region]:
@@ -31,10 +31,10 @@ def valid(mesh: Mesh) -> Mesh:
 def test_the_energy_is_that_of_the_metrics(mesh: Mesh) -> None:
     start = valid(mesh)
     points, region = region_of(start)
-    energy, _ = kernels.shape_energy(points, region.simplices, NO_CORNERS, len(region.moving), *GOAL, 1)
+    energy, _ = kernels.shape_energy(points, region.simplices, *NO_CORNERS, len(region.moving), *GOAL, 1)
     own = start.movable[start.topology.simplices].any(axis=1)
     ratio, angle = evaluate("mean_ratio", start)[own], evaluate("min_angle", start)[own]
-    goal, floor, _, weight = GOAL
+    goal, floor, _, weight, _ = GOAL
     below = np.maximum(0, goal - angle) ** 2 + 30 * np.maximum(0, floor - angle) ** 2
     assert (below > 0).any()
     assert energy == pytest.approx((-100 * ratio - 0.3 * angle + weight * below).sum(), rel=1e-9)
@@ -45,8 +45,8 @@ def test_the_gradient_is_right(mesh: Mesh, share: float, random: np.random.Gener
     start = valid(mesh)
     points, region = region_of(start)
     free, d = len(region.moving), points.shape[1]
-    goal = (*GOAL[:2], share * start.check()[1], GOAL[3])
-    _, gradient = kernels.shape_energy(points, region.simplices, NO_CORNERS, free, *goal, 1)
+    goal = (*GOAL[:2], share * start.check()[1], *GOAL[3:])
+    _, gradient = kernels.shape_energy(points, region.simplices, *NO_CORNERS, free, *goal, 1)
     centre = points.mean(axis=0)
     unit = np.linalg.norm(points - centre, axis=1).max() / len(points) ** (1 / d)
     for _ in range(5):
@@ -55,13 +55,13 @@ def test_the_gradient_is_right(mesh: Mesh, share: float, random: np.random.Gener
         for step in (1e-7, -1e-7):
             there = points.copy()
             there[:free] += step * unit * way
-            ends.append(kernels.shape_energy(there, region.simplices, NO_CORNERS, free, *goal, 1)[0])
+            ends.append(kernels.shape_energy(there, region.simplices, *NO_CORNERS, free, *goal, 1)[0])
         assert (gradient * way).sum() == pytest.approx((ends[0] - ends[1]) / 2e-7, rel=1e-4)
 
 
 def test_no_step_leads_out_of_the_valid_meshes(mesh: Mesh) -> None:
     points, region = region_of(tangle(mesh, 30, 2))
-    assert kernels.shape_energy(points, region.simplices, NO_CORNERS, len(region.moving), *GOAL, 1)[0] == math.inf
+    assert kernels.shape_energy(points, region.simplices, *NO_CORNERS, len(region.moving), *GOAL, 1)[0] == math.inf
     start = valid(mesh)
     free = start.along_curve(start.movable)
     after = start.with_vertices(shaped(start.along_curve(start.points), start.topology.stars(1), free, Goal(25.0), 1))

@@ -23,9 +23,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import ceiling, displacement, summarise
 from meshfix_cli.report.as_json import history_csv
-from meshfix_cli.solve.foldover import MINIMISATIONS, QUICK, THOROUGH, Reach, minimisations
+from meshfix_cli.solve.foldover import MINIMISATIONS, QUICK, REGION_PATIENCE, THOROUGH, Reach, minimisations
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.run import GAIN, NEAR, REGION_PATIENCE
+from meshfix_cli.solve.run import GAIN, NEAR
 from meshfix_cli.solve.strategies import SMOOTHING, STRATEGIES, SWEEPS, plan
 from meshfix_cli.solve.untangle import steps
 

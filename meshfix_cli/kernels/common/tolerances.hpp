@@ -51,6 +51,7 @@ constexpr double LEAST_SHARE = 0.01;
 // Shape of all elements at once: what a mean ratio of one and a degree are worth, and the gain an element, in the mean,
 // below which an iteration is the last; the floor counts so many times the goal.
 constexpr double SHAPE_RATIO = 100.0, SHAPE_ANGLE = 0.3, SHAPE_GAIN = 1e-3, SHAPE_FLOOR = 30.0;
+constexpr double SHAPE_SHARP_GAIN = 1e-5;  // where elements are judged by their worst corners: many small steps pay
 constexpr double SHAPE_MEASURE = 1e5, SHAPE_MARGIN = 0.02;  // of the smallest determinant, which may not get smaller
 
 // Facets cross where every determinant that says so is larger than this, relative to its points' largest distance^d:

@@ -150,20 +150,34 @@ auto foldover_energy_py(const Matrix<const std::int32_t>& simplices, const Matri
     return std::make_tuple(value.energy, to_numpy(std::move(gradient), d), value.min_det);
 }
 
-template <int D>
-Shape<D> make_shape(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                    const Vector<const double>& corners, std::int64_t free, double goal, double floor, double measure,
-                    double weight, int threads) {
-    return {points.data(), static_cast<std::int64_t>(points.shape(0)), free, simplices.data(),
-            static_cast<std::int64_t>(simplices.shape(0)), {corners.data(), corners.data() + corners.size()}, {goal, floor, measure, weight}, threads};
-}
+// What of `Shape` is the same for all dimensions; owners (m,) the elements of the simplices.
+struct ShapeArguments {
+    const Matrix<const double>& points;
+    const Matrix<const std::int32_t>& simplices;
+    const Vector<const double>& corners;
+    const Vector<const std::int32_t>& owners;
+    std::int64_t free;
+    ShapeGoal goal;
+    int threads;
+
+    template <int D>
+    Shape<D> make() const {
+        return {points.data(), static_cast<std::int64_t>(points.shape(0)), free, simplices.data(),
+                static_cast<std::int64_t>(simplices.shape(0)),
+                {{corners.data(), corners.data() + corners.size()}, {owners.data(), owners.data() + owners.size()}}, goal,
+                threads};
+    }
+};
 
 auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-                     const Vector<const double>& corners, std::int64_t free, double goal, double floor, double measure, double weight, int threads) {
+                     const Vector<const double>& corners, const Vector<const std::int32_t>& owners, std::int64_t free,
+                     double goal, double floor, double measure, double weight, double sharpness, int threads) {
     const std::size_t d = points.shape(1);
+    const ShapeGoal aims{goal, floor, measure, weight, sharpness};
+    const ShapeArguments arguments{points, simplices, corners, owners, free, aims, threads};
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
     const double value = with_dimension(d, [&](auto dimension) {
-        auto shape = make_shape<dimension>(points, simplices, corners, free, goal, floor, measure, weight, threads);
+        auto shape = arguments.make<dimension>();
         const Numbers x = shape.start();
         return shape(x.data(), gradient.data());
     });
@@ -172,11 +186,13 @@ auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std:
 
 // The free points where so many iterations end.
 auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
-               const Vector<const double>& corners, std::int64_t free, double goal, double floor, double measure, double weight, int iterations, int threads) {
+               const Vector<const double>& corners, const Vector<const std::int32_t>& owners, std::int64_t free, double goal,
+               double floor, double measure, double weight, double sharpness, int iterations, int threads) {
     const std::size_t d = points.shape(1);
+    const ShapeGoal aims{goal, floor, measure, weight, sharpness};
+    const ShapeArguments arguments{points, simplices, corners, owners, free, aims, threads};
     return to_numpy(with_dimension(d, [&](auto dimension) {
-        Lbfgs<Shape<dimension>> lbfgs(make_shape<dimension>(points, simplices, corners, free, goal, floor, measure, weight, threads), free * dimension,
-                              threads);
+        Lbfgs<Shape<dimension>> lbfgs(arguments.make<dimension>(), free * dimension, threads);
         lbfgs.start();
         lbfgs.minimise(iterations);
         return lbfgs.function().free_points(lbfgs.x());
@@ -257,10 +273,11 @@ void bind_moves(nb::module_& m) {
           "threads"_a);
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
-    m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(), "free"_a, "goal"_a,
-          "floor"_a, "measure"_a, "weight"_a, "threads"_a);
-    m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a,
-          "measure"_a, "weight"_a, "iterations"_a, "threads"_a);
+    m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
+          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "threads"_a);
+    m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
+          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "iterations"_a,
+          "threads"_a);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;
 

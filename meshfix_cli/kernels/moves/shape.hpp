@@ -7,7 +7,9 @@
 // t the smallest angle in degrees; the goal lifts the few that are worse than the others, the floor holds the worst, and
 // the last term the smallest determinant, where `least` is positive.
 // Where elements are not all simplices, of their corners
-//         - RATIO q + weight (...), q the scaled Jacobian, t its arc sine in degrees.
+//         - RATIO q + weight (...), q the scaled Jacobian, t its arc sine in degrees;
+// where the sharpness k is not 0, the q of an element's n corners have their place taken by n times what lies between
+// their mean and their smallest, -1/k log (1/n sum exp(-k q)): elements are judged by their worst corners.
 //
 // It is infinite where a simplex has no positive determinant, so that a minimiser that starts from a valid mesh never
 // leaves those. The mean ratio is that of P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
@@ -20,7 +22,14 @@
 namespace meshfix {
 
 struct ShapeGoal {
-    double degrees, floor, measure, weight;
+    double degrees, floor, measure, weight, sharpness;
+};
+
+// Of the simplices that are corners of elements: their weights of scaled Jacobians, 0 for others, and their elements,
+// one behind the other; or none.
+struct ShapeCorners {
+    std::vector<double> weights;
+    std::vector<std::int32_t> owners;
 };
 
 // Adds `factor` times the gradient of the k-th angle by the corners, in radians: a corner that moves away from the
@@ -52,12 +61,12 @@ inline void add_slopes_of_angle(const Edges<3>& e, std::size_t k, double factor,
 template <int D>
 class Shape {
    public:
-    // points (n, D), the `free` ones first; simplices (m, D+1); corners (m,): the weights of the scaled Jacobians at the
-    // first vertices of those that are corners of elements, 0 for others; or none.
+    // points (n, D), the `free` ones first; simplices (m, D+1), the first vertex of each that is a corner is there.
     Shape(const double* points, std::int64_t n, std::int64_t free, const std::int32_t* simplices, std::int64_t m,
-          std::vector<double> corners, ShapeGoal goal, int threads)
-        : assembly_(simplices, m, n), corners_(std::move(corners)), parts_(assembly_.items()), free_(free),
+          ShapeCorners corners, ShapeGoal goal, int threads)
+        : assembly_(simplices, m, n), corners_(std::move(corners.weights)), parts_(assembly_.items()), free_(free),
           threads_(threads), goal_(goal), points_(points, points + n * D) {
+        if (goal_.sharpness > 0.0 && !corners_.empty()) find_elements(corners.owners);
         for (std::int64_t i = 0; i < n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(n);
         double size2 = 0.0;
         for (std::int64_t v = 0; v < n; ++v) size2 = larger(size2, norm2(load<D>(points + v * D) - origin_));
@@ -75,6 +84,7 @@ class Shape {
 
     double operator()(const double* x, double* gradient) {
         std::copy(x, x + free_ * D, points_.begin());
+        weigh_corners();
         assembly_.evaluate(free_, gradient, threads_, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
             parts_[item] = look_at(begin, end);
         });
@@ -84,7 +94,9 @@ class Shape {
     }
 
     bool enough() const { return false; }
-    double least_gain() const { return SHAPE_GAIN * static_cast<double>(assembly_.size()); }
+    double least_gain() const {
+        return (elements_.empty() ? SHAPE_GAIN : SHAPE_SHARP_GAIN) * static_cast<double>(assembly_.size());
+    }
 
     // The free points (free, D) at a vector, in model units.
     std::vector<double> free_points(const double* x) const {
@@ -94,6 +106,50 @@ class Shape {
     }
 
    private:
+    // What a corner adds to the energy but for goal and floor: its share of what its element does, and the slope by q.
+    struct Share {
+        double value, slope;
+    };
+
+    void find_elements(const std::vector<std::int32_t>& owners) {
+        shares_.resize(owners.size());
+        for (std::size_t s = 0; s < owners.size(); ++s)
+            if (s == 0 || owners[s] != owners[s - 1]) elements_.push_back(static_cast<std::int64_t>(s));
+        elements_.push_back(static_cast<std::int64_t>(owners.size()));
+    }
+
+    void weigh_corners() {
+        if (elements_.empty()) return;
+        const auto count = static_cast<std::int64_t>(elements_.size()) - 1;
+        for_each_range(count, ELEMENTS_PER_ITEM, threads_, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t e = begin; e < end; ++e)
+                if (corners_[elements_[e]] > 0.0) weigh(elements_[e], elements_[e + 1]);
+        });
+    }
+
+    // The corners of one element; exp(-k (q - 1)) is never larger than exp(2 k).
+    void weigh(std::int64_t begin, std::int64_t end) {
+        const double count = static_cast<double>(end - begin), k = goal_.sharpness;
+        double sum = 0.0;
+        for (std::int64_t s = begin; s < end; ++s) {
+            const std::int32_t* simplex = assembly_.simplices().data() + s * (D + 1);
+            const Vec<D> first = load<D>(points_.data() + static_cast<std::int64_t>(simplex[0]) * D);
+            Edges<D> e;
+            for (int i = 0; i < D; ++i)
+                e[i] = load<D>(points_.data() + static_cast<std::int64_t>(simplex[i + 1]) * D) - first;
+            shares_[s].slope = std::exp(k * (1.0 - scaled(e, corners_[s])));
+            sum += shares_[s].slope;
+        }
+        const double value = SHAPE_RATIO * (std::log(sum / count) / k - 1.0);
+        for (std::int64_t s = begin; s < end; ++s) shares_[s] = {value, -SHAPE_RATIO * count * shares_[s].slope / sum};
+    }
+
+    static double scaled(const Edges<D>& e, double weight) {
+        double product2 = 1.0;
+        for (int k = 0; k < D; ++k) product2 *= norm2(e[k]);
+        return weight * determinant(e) / std::sqrt(product2);
+    }
+
     double look_at(std::int64_t begin, std::int64_t end) {
         LaneSum energy;
         for (std::int64_t s = begin; s < end; s += LANES) {
@@ -104,7 +160,7 @@ class Shape {
             const int count = static_cast<int>(std::min<std::int64_t>(LANES, end - s));
             for (int i = 0; i < count; ++i) {
                 if (!corners_.empty() && corners_[s + i] > 0.0) {
-                    value[i] = of_corner(e, i, corners_[s + i], slopes);
+                    value[i] = of_corner(e, i, s + i, slopes);
                     continue;
                 }
                 std::size_t k = 0;
@@ -148,16 +204,15 @@ class Shape {
     }
 
     // Of lane i, which is the corner of an element; with E = q = weight det / (product of the edges).
-    double of_corner(const Edges<D, Pack>& edges, int i, double weight, Corners<D, Pack>& slopes) const {
+    double of_corner(const Edges<D, Pack>& edges, int i, std::int64_t s, Corners<D, Pack>& slopes) const {
         const Edges<D> e = lane(edges, i);
         const double det = determinant(e);
         if (!(det > 0.0)) return INFINITY;
-        double product2 = 1.0;
-        for (int k = 0; k < D; ++k) product2 *= norm2(e[k]);
-        const double q = weight * det / std::sqrt(product2);
+        const double q = scaled(e, corners_[s]);
+        const Share share = shares_.empty() ? Share{-SHAPE_RATIO * q, -SHAPE_RATIO} : shares_[s];
         const double angle = DEGREE * std::asin(smaller(q, 1.0)), missing = larger(0.0, goal_.degrees - angle);
         const double below = SHAPE_FLOOR * larger(0.0, goal_.floor - angle);
-        double slope = -SHAPE_RATIO;
+        double slope = share.slope;
         if (missing + below > 0.0)
             slope -= 2.0 * goal_.weight * (missing + below) * DEGREE / std::sqrt(larger(1.0 - q * q, 1e-6));
         const Edges<D> normals = determinant_slopes(e);
@@ -168,7 +223,7 @@ class Shape {
             for (int x = 0; x < D; ++x) slopes[k + 1][x][i] = mine[x];
         }
         for (int x = 0; x < D; ++x) slopes[0][x][i] = first[x];
-        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) - SHAPE_RATIO * q;
+        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) + share.value;
     }
 
     static Edges<D> lane(const Edges<D, Pack>& edges, int i) {
@@ -192,9 +247,12 @@ class Shape {
     }
 
     static constexpr double DEGREE = 57.29577951308232;
+    static constexpr std::int64_t ELEMENTS_PER_ITEM = 512;
 
     Assembly<D> assembly_;
     std::vector<double> corners_, parts_;
+    std::vector<std::int64_t> elements_;  // where the corners of each begin, and the end; or none
+    std::vector<Share> shares_;           // (m,) or none
     std::int64_t free_;
     int threads_;
     ShapeGoal goal_;

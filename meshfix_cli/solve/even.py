@@ -1,0 +1,66 @@
+"""Even sizes for elements that are not simplices: hard tangles leave some uneven, and sweeps hardly change that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.solve.foldover import evened
+from meshfix_cli.solve.region import Region
+from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ITERATIONS = 100
+# There is something to gain where the smallest scaled Jacobian is below such a share of the mean and of the ceiling;
+# the second is that where the first percentile of the sizes is below `UNEVEN` of their mean.
+POOR, POOR_OF_UNEVEN, UNEVEN = 0.62, 0.7, 0.25
+
+
+def evened_where_poor(
+    smallest: float, mean: float, goal: Goal, threads: int, stars: kernels.Connectivity, points: Array, free: Mask
+) -> Iterator[Array]:
+    """Yield the points (n, d) with even sizes and then the best shape, where scaled Jacobians are poor.
+
+    Parameters
+    ----------
+    smallest, mean : float
+        Scaled Jacobians of the mesh.
+    goal : Goal
+        Of the shape.
+    threads : int
+        The points have the same bits for any number.
+    stars : Connectivity
+    points : (n, d) float64
+        Of a valid mesh.
+    free : (n,) bool
+    """
+    if smallest >= max(POOR, POOR_OF_UNEVEN) * mean:
+        return
+    sizes = kernels.measure(points, stars.simplices, threads)[0]
+    uneven = np.percentile(sizes, 1, method="lower") < UNEVEN * sizes.mean()
+    if smallest < (POOR_OF_UNEVEN if uneven else POOR) * min(mean, ceiling(points, stars, free)):
+        even = evened(points, stars, free, threads, ITERATIONS)
+        yield shaped(even, stars, free, goal, threads, FEW_ITERATIONS)
+
+
+def ceiling(points: Array, mesh: kernels.Connectivity, free: Mask) -> float:
+    """Return the largest smallest scaled Jacobian that edges between held vertices (n,) allow at the corners there.
+
+    It is at most the sine of the angle between two edges.
+    """
+    region = Region(mesh, free)
+    weights, rows = corner_weights(mesh, region), region.global_simplices
+    edges = points[rows[:, 1:]] - points[rows[:, :1]]
+    edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), np.finfo(float).tiny)
+    least = np.inf
+    for i, j in combinations(range(1, rows.shape[1]), 2):
+        held = (weights > 0) & ~free[rows[:, [0, i, j]]].any(axis=1)
+        cosine = (edges[held, i - 1] * edges[held, j - 1]).sum(axis=1)
+        least = min(least, float((weights[held] * np.sqrt(np.maximum(1 - cosine**2, 0))).min(initial=np.inf)))
+    return least

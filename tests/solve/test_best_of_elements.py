@@ -1,0 +1,77 @@
+""" "best" where elements are not all simplices: no figure is below the default's, and the worst corners count most."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from elements import MESHES, tangles
+
+from meshfix_cli import Mesh, kernels, untangle
+from meshfix_cli.mesh.judged import Judged
+from meshfix_cli.quality.formulas import evaluate
+from meshfix_cli.solve.compared import KEPT
+from meshfix_cli.solve.even import ceiling
+
+
+def tangled(name: str, how: str) -> Mesh:
+    mesh = Mesh.build(*MESHES[name]())
+    return mesh.with_points(tangles(name, mesh.points, mesh.movable, mesh.mean_edge_length())[how])
+
+
+def corners(mesh: Mesh) -> np.ndarray:
+    return np.sin(Judged(mesh.topology.stars(1)).angles(mesh.along_curve(mesh.points), 1))
+
+
+@pytest.mark.parametrize("name", ["quad plate", "hexes beside tets", "hex plate", "every solid"])
+def test_no_figure_is_below_the_defaults(name: str) -> None:
+    mesh = tangled(name, "P=25 D=2h")
+    default, best = untangle(mesh).after, untangle(mesh, smooth="best").after
+    assert best.check()[0] == 0
+    for before, after in (
+        (evaluate("scaled_jacobian", default), evaluate("scaled_jacobian", best)),
+        (corners(default), corners(best)),
+    ):
+        assert after.min() >= before.min() - 1e-8
+        assert after.mean() >= before.mean() - 1e-8
+    figures = [evaluate("scaled_jacobian", mesh) for mesh in (default, best)]
+    assert np.percentile(figures[1], 1, method="lower") >= KEPT * np.percentile(figures[0], 1, method="lower") - 1e-8
+
+
+def test_the_bits_are_those_of_one_thread() -> None:
+    mesh = tangled("hexes and wedges", "P=25 D=2h")
+    ends = {untangle(mesh, smooth="best", threads=threads).after.points.tobytes() for threads in (1, 2, 3)}
+    assert len(ends) == 1
+
+
+def test_sizes_are_made_even_where_a_hard_tangle_left_them_uneven() -> None:
+    mesh = tangled("quad rings", "hole turned by 20°")
+    outcome = untangle(mesh)
+    names = [record.phase for record in outcome.records]
+    assert names[-1] == "smoothing to even sizes"
+    assert corners(outcome.after).mean() > 0.95
+    assert outcome.records[-1].inverted == 0
+
+
+@pytest.mark.parametrize("sharpness", [2.0, 15.0])
+def test_the_sharp_energy_is_between_mean_and_smallest_of_the_corners(sharpness: float) -> None:
+    mesh = untangle(tangled("hexes of tets", "P=25 D=2h"), smooth=1).after
+    stars, points = mesh.topology.stars(1), np.ascontiguousarray(mesh.along_curve(mesh.points))
+    simplices, owners = stars.simplices, np.ascontiguousarray(stars.owners)
+    weights = np.ones(len(simplices))
+    energy, _ = kernels.shape_energy(points, simplices, weights, owners, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 1)
+    edges = points[simplices[:, 1:]] - points[simplices[:, :1]]
+    scaled = (np.linalg.det(edges) / np.linalg.norm(edges, axis=2).prod(axis=1)).reshape(-1, 8)
+    soft = -np.log(np.exp(-sharpness * scaled).mean(axis=1)) / sharpness
+    assert (soft <= scaled.mean(axis=1) + 1e-12).all()
+    assert (soft >= scaled.min(axis=1)).all()
+    assert energy == pytest.approx(-100 * 8 * soft.sum(), rel=1e-9)
+
+
+def test_no_motion_of_free_vertices_exceeds_the_ceiling(random: np.random.Generator) -> None:
+    mesh = Mesh.build(*MESHES["hex bracket"]())
+    free, points = mesh.along_curve(mesh.movable), mesh.along_curve(mesh.points)
+    most = ceiling(points, mesh.topology.stars(1), free)
+    assert corners(untangle(mesh, smooth="best").after).min() <= most + 1e-12 < 1
+    for _ in range(5):
+        moved = points + free[:, None] * 0.05 * mesh.mean_edge_length() * random.standard_normal(points.shape)
+        assert corners(mesh.with_vertices(moved)).min() <= most + 1e-12

@@ -52,6 +52,8 @@ class Document:
         Spans the plane of a planar mesh in space.
     copies : (n,) int64 or None
         For each point the one that stands for it in the mesh, where points at one place are joined.
+    arbitrary : (m,) bool or None
+        The elements that are numbered the other way round, where the file's numbering says nothing of that.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Document:
     solved: Solved = field(repr=False)
     basis: NDArray[np.float64] | None
     copies: NDArray[np.int64] | None = None
+    arbitrary: NDArray[np.bool_] | None = None
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -152,8 +155,17 @@ class Document:
         ReadError
             They are strips of triangles, in which no triangle can be renumbered alone.
         """
+        return self._turned(self.mesh.topology)
+
+    def oriented(self) -> Source:
+        """Return the source for a format in which the numbering of cells tells their orientation."""
+        if self.arbitrary is None:
+            return self.source
+        return with_reversed(self.source, self._turned(replace(self.mesh.topology, flipped=self.arbitrary)))
+
+    def _turned(self, topology: Topology) -> dict[int, Turned]:
         rows: dict[int, NDArray[np.int64]] = {}
-        for part in self.solved.some(np.flatnonzero(_reversed(self.solved, self.mesh.topology))):
+        for part in self.solved.some(np.flatnonzero(_reversed(self.solved, topology))):
             here = np.arange(len(part.vertices)) if part.rows is None else part.rows
             rows[part.run] = np.concatenate([rows.get(part.run, here[:0]), here])
         return turned(self.source.cells, rows)
@@ -183,6 +195,7 @@ def build(
     named = {one: _fixed_by(source, one) for one in fix}
     held |= {f"by --fix {one}": mask for one, mask in named.items()}
     mesh = replace(Mesh.build(points, solved.blocks, threads=threads), apart=source.apart)
+    arbitrary = None if source.oriented else mesh.topology.flipped
     if not source.oriented:  # the numbering says nothing
         mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
     topology = mesh.topology
@@ -209,7 +222,7 @@ def build(
     fixed = {reason: count for reason, count in fixed.items() if count}
     ids = solved.of_elements(_ids(source))
     ids = ids if topology.m == len(ids) else ids[topology.source]
-    return Document(name, mesh, form, ids, fixed, solved.not_judged(), notes, source, solved, basis, copies)
+    return Document(name, mesh, form, ids, fixed, solved.not_judged(), notes, source, solved, basis, copies, arbitrary)
 
 
 def with_reversed(source: Source, cells: Mapping[int, Turned]) -> Source:

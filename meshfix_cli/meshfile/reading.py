@@ -87,8 +87,18 @@ def read(
 
 
 def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
-    """Return where the pieces of a `.pvtu` are, and where those of an output would be; none of what cannot be read."""
-    if Path(source).suffix.lower() != ".pvtu":
+    """Return where the files are that a `.pvtu`, a `.foam` or one of two files stands for, and those of an output.
+
+    None of what cannot be read.
+    """
+    here, there, suffix = Path(source), Path(target), Path(source).suffix.lower()
+    if suffix == ".foam":
+        points = Path("constant", "polyMesh", "points")
+        return [str(here.parent / points)], [str(there.parent / points)]
+    if suffix in (".node", ".ele"):
+        other = ".ele" if suffix == ".node" else ".node"
+        return [str(here.with_suffix(other))], [str(there.with_suffix(other))]
+    if suffix != ".pvtu":
         return [], []
     from meshfix_cli.meshfile.vtk.pvtu import Index
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import ReadError, naming
+from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import CODES, IntegerLines, Numbering, Runs, integer_lines, lines, without
@@ -43,7 +43,13 @@ def parse(_: bytes, path: Path | None) -> Source:
     facets = {one.suffix: one.read_bytes() for one in copied if one.suffix in _FACETS}
 
     def places(target: Path) -> list[Path]:
-        return [target.with_suffix(one.suffix) for one in (*changed, *copied)]
+        if target.suffix not in (".node", ".ele"):
+            raise WriteError(f"{target}: is neither a .node nor an .ele")
+        mine = [target.with_suffix(one.suffix) for one in (*changed, *copied)]
+        stale = [one for suffix in _FACETS if (one := target.with_suffix(suffix)).exists() and one not in mine]
+        if stale:
+            raise WriteError(f"{target}: {stale[0].name} is there, and would belong to it; name another OUTPUT")
+        return mine
 
     def read(contents: Sequence[bytes]) -> Source:
         source, layout = _source(contents[0], contents[1], facets)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,6 +64,8 @@ class Together:
             return [str(path) for path in self.changed]
         there = Path(target)
         found = self.places(there) if self.places else beside(self.main, there, self.paths)
+        if len({path.resolve() for path in found}) < len(self.paths):
+            raise WriteError(f"{target}: two files of the input would have one name there; name its like")
         for path in found:
             if path.resolve() in {one.resolve() for one in self.paths}:
                 raise WriteError(f"{target}: {path.name} would replace a file of the input; name another OUTPUT")
@@ -92,10 +95,14 @@ class Together:
 
 
 def beside(main: Path, target: Path, paths: Sequence[Path]) -> list[Path]:
-    """Return where files go that are named after the main one, or not: beside an output, named after that."""
+    """Return where files go that are named after the main one, or not: beside an output, named after that.
+
+    Those of other folders have the names of these in their own, so that two of one name stay two.
+    """
     names = []
     for path in paths:
-        rest = path.name.removeprefix(main.stem)
-        named_after = rest != path.name and not rest[:1].isalnum()
-        names.append(target.name if path == main else f"{target.stem}{rest if named_after else f'_{path.name}'}")
+        there = os.path.relpath(path, main.parent).replace(f"..{os.sep}", "").replace(os.sep, "_")
+        rest = there.removeprefix(main.stem)
+        named_after = rest != there and not rest[:1].isalnum()
+        names.append(target.name if path == main else f"{target.stem}{rest if named_after else f'_{there}'}")
     return [target.parent / name for name in names]

@@ -26,6 +26,7 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
 from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing
 
 Put = Callable[[Path, Places, Points, NDArray[np.bool_]], None]
+UNORIENTED = ("dolfin-xml", "xdmf")  # whose programs number cells with no regard to their orientation
 _WITH_CELLS = ("vtu", "vtk")  # what programs draw data of cells from
 ROUNDING = 1e-4  # relative to the size of the mesh: more than any format rounds, less than any mesh can bear
 
@@ -90,7 +91,8 @@ def write(
             temporary.write_bytes(unmoved)
             return
         try:
-            held, dropped = _write_anew(temporary, _merged(source, form), points, form)
+            anew = source if form.reader in UNORIENTED else document.oriented()
+            held, dropped = _write_anew(temporary, _merged(anew, form), points, form)
         except WriteError as error:
             raise WriteError(f"{target}: {error}") from error
         if form == document.format and source.data is not None:

@@ -58,6 +58,7 @@ def _parsed(data: bytes) -> Source:
     notes = (
         "instances are not moved to their places in the assembly: coordinates are those of the parts",
     ) * deck.placed + ("its last line does not end, as if the file had been cut there",) * deck.open_end
+    notes += ("its steps include other files, which are left where they are",) * deck.included_by_steps
     untold = ("numbers of nodes and elements", *deck.untold())
     apart = sum(1 for _ in deck.of("PART")) > 1
     return Source(points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes, apart=apart)

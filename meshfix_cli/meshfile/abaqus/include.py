@@ -48,8 +48,9 @@ def _renamed(data: bytes, names: Mapping[str, str]) -> bytes:
     parts, at = [], 0
     for begin, end, _ in inclusions(data):
         word = data[begin:end]
-        quote = word[:1] if word.startswith(b'"') else b""
-        parts += [data[at:begin], quote, os.fsencode(names[_name(word)]), quote]
+        name = os.fsencode(names[_name(word)])
+        quote = b'"' if word.startswith(b'"') or re.search(rb"[\s,]", name) else b""
+        parts += [data[at:begin], quote, name, quote]
         at = end
     return b"".join([*parts, data[at:]])
 

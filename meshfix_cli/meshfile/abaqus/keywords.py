@@ -93,6 +93,12 @@ class Deck:
         return bool(cut and self.blocks and self.blocks[-1].keyword in MESH)
 
     @property
+    def included_by_steps(self) -> bool:
+        """Whether files are included behind where the steps begin."""
+        keywords = [block.keyword for block in self.blocks]
+        return "STEP" in keywords and "INCLUDE" in keywords[keywords.index("STEP") :]
+
+    @property
     def placed(self) -> bool:
         """Whether an instance is moved to its place in the assembly."""
         return any(self.text[block.begin : block.end].strip() for block in self.of("INSTANCE"))

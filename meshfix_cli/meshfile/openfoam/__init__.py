@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from meshfix_cli.errors import ReadError, naming
+from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.compressed import is_compressed, packed, unpacked
 from meshfix_cli.meshfile.faces import Faces
 from meshfix_cli.meshfile.openfoam.lists import File
@@ -52,8 +52,14 @@ def parse(_: bytes, path: Path | None) -> Source:
     def places(target: Path) -> list[Path]:
         there = target / "constant" / "polyMesh" if target.name != "polyMesh" else target
         if target.suffix == SUFFIX:
+            if not marked:
+                raise WriteError(f"{target}: a folder goes into a folder; name one as OUTPUT")
             there = target.parent / "constant" / "polyMesh"
-        return [*(there / one.relative_to(folder) for one in (points, *copied)), *([target] if marked else [])]
+        mine = [there / one.relative_to(folder) for one in (points, *copied)]
+        others = {one for one in there.rglob("*") if one.is_file()} - set(mine)
+        if others:
+            raise WriteError(f"{target}: has a file {min(others).name} of another mesh; name another OUTPUT")
+        return [*mine, *[target if target.suffix == SUFFIX else target / one.name for one in marked]]
 
     def read(contents: Sequence[bytes]) -> Source:
         data = unpacked(contents[0]) if is_compressed(contents[0]) else contents[0]

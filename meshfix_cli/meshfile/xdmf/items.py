@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from html import unescape
 from itertools import takewhile
 from os.path import normpath
 from typing import Any
@@ -104,11 +105,11 @@ def item_of(tree: Tree, parent: Element, number: int = 0) -> Item:
         name, _, path = text.rpartition(":")
         if not name.strip() or not path.strip():
             raise ReadError(f"is not a readable xdmf file: {text!r} names no data set in a file")
-        return Item(element, form, dtype, shape, normpath(name.strip()), path.strip())
+        return Item(element, form, dtype, shape, normpath(unescape(name.strip())), path.strip())
     seek = said(element, "Seek") or "0"
     if not text or not seek.isdecimal():
         raise ReadError("is not a readable xdmf file: binary numbers have no file or no offset")
-    return Item(element, form, dtype, shape, normpath(text), seek=int(seek))
+    return Item(element, form, dtype, shape, normpath(unescape(text)), seek=int(seek))
 
 
 def files_named(tree: Tree) -> list[tuple[str, int, int]]:
@@ -119,7 +120,9 @@ def files_named(tree: Tree) -> list[tuple[str, int, int]]:
         if form in ("hdf", "hdf5", "binary") and text.strip() and not element.attributes.get("Reference"):
             name = text.rpartition(b":")[0] if form != "binary" else text
             begin = element.begin + len(name) - len(name.lstrip())
-            found.append((normpath(name.strip().decode("utf-8", "replace")), begin, begin + len(name.strip())))
+            found.append(
+                (normpath(unescape(name.strip().decode("utf-8", "replace"))), begin, begin + len(name.strip()))
+            )
     return found
 
 

@@ -187,13 +187,14 @@ def check_output(document: Document, target: str, form: Format) -> None:
     if pieces is not None and form == document.format:
         if is_packed(document, target):
             raise WriteError(f"{target}: a mesh in several files is not compressed; name an OUTPUT without .gz")
+        folder = Path(target).is_dir()
+        if is_stream(target) and not folder:
+            name = "<stdout>" if target == "-" else target
+            several = "a mesh in several files cannot go into a stream"
+            raise WriteError(f"{name}: {several}; name an OUTPUT, or a --format")
         targets = pieces.targets(target)
-        if not (Path(target).is_dir() and all(Path(one).is_relative_to(target) for one in targets)):
+        if not (folder and all(Path(one).is_relative_to(target) for one in targets)):
             check_target(target)
-            if is_stream(target):
-                name = "<stdout>" if target == "-" else target
-                several = "a mesh in several files cannot go into a stream"
-                raise WriteError(f"{name}: {several}; name an OUTPUT, or a --format")
         for path in targets:
             if Path(path).parent.is_dir():  # else it will be made
                 check_target(path)

@@ -112,7 +112,9 @@ class File:
         if count and not rest and (values[::each] == each - 1).all():
             return (each - 1) * np.arange(count + 1), values.reshape(count, each)[:, 1:].ravel().astype(np.int64)
         starts = chain(values, count, "numbers of vertices of its faces")
-        return np.concatenate([[0], np.cumsum(values[starts], dtype=np.int64)]), np.delete(values, starts)
+        return np.concatenate([[0], np.cumsum(values[starts], dtype=np.int64)]), np.delete(values, starts).astype(
+            np.int64
+        )
 
     def blocks(self) -> Iterator[tuple[str, bytes, Int64]]:
         """Give the names of the dictionaries of a list, what each holds up to a list of its own, and the first such."""

@@ -25,6 +25,7 @@ from meshfix_cli.meshfile.tables import (
     Numbering,
     Runs,
     alike,
+    check_blank,
     integer_lines,
     lines,
     rows,
@@ -59,8 +60,8 @@ def parse(data: bytes) -> Source:
     counts, at = _counts(text)
     table, at = rows(text, at, counts[0], 4)
     cells = integer_lines(text, at, counts[1], "cell")
-    if not any(counts[2:]) and (left := text[cells.end :].lstrip()):
-        raise in_line(text, len(text) - len(left), "there are more lines than announced")
+    if not any(counts[2:]):
+        check_blank(text, cells.end)
     coordinates, points = Places.of_text(table[:, 1:]), Numbering(integers_at(text, table[:, 0]))
     place, runs = coordinates.read(text), Runs()
     found = [(chosen, _cells(cells, chosen, points)) for chosen in _by_type(cells)]

@@ -17,7 +17,17 @@ import numpy as np
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, IntegerLines, Numbering, Runs, alike, integer_lines, lines, without
+from meshfix_cli.meshfile.tables import (
+    Int64,
+    IntegerLines,
+    Numbering,
+    Runs,
+    alike,
+    check_blank,
+    integer_lines,
+    lines,
+    without,
+)
 from meshfix_cli.meshfile.text import Spans, in_line
 
 _COMMENT = re.compile(rb"#[^\n\r]*")
@@ -55,11 +65,9 @@ def _tables(text: bytes, at: int, n: int, m: int) -> tuple[Spans, IntegerLines, 
 
 
 def _check_end(text: bytes, end: int) -> None:
-    left = text[end:].lstrip()
-    if _KEYWORD.match(left):
+    if _KEYWORD.match(text[end:].lstrip()):
         raise ReadError("holds several meshes, and one mesh is read: give each a file of its own")
-    if left:
-        raise in_line(text, len(text) - len(left), "there are more lines than announced")
+    check_blank(text, end)
 
 
 def _runs(faces: IntegerLines, n: int) -> Runs:

@@ -25,6 +25,7 @@ from meshfix_cli.meshfile.tables import (
     Numbering,
     Runs,
     alike,
+    check_blank,
     integer_lines,
     lines,
     without,
@@ -83,7 +84,7 @@ def _zones(text: bytes) -> Iterator[_Zone]:
     zone, name, at, behind = _Zone(), "", 0, 0
     while match := _KEYWORD.search(text, at):
         if behind == at:
-            _check_blank(text, at, match.start())
+            check_blank(text, at, match.start())
         keyword, at = match[1].upper(), match.end()
         if keyword == b"IZONE" or (keyword == b"NDIME" and zone.dimension):
             if zone.dimension:
@@ -104,15 +105,9 @@ def _zones(text: bytes) -> Iterator[_Zone]:
             zone.markers.append(("" if keyword == b"NELEM" else name or "?", table))
             at = behind = table.end
     if behind == at:
-        _check_blank(text, at, len(text))
+        check_blank(text, at)
     if zone.dimension:
         yield zone
-
-
-def _check_blank(text: bytes, begin: int, end: int) -> None:
-    left = text[begin:end].lstrip()
-    if left:
-        raise in_line(text, end - len(left), "there are more lines than announced")
 
 
 def _count(text: bytes, match: re.Match[bytes]) -> int:

@@ -154,6 +154,13 @@ def integer_lines(text: bytes, at: int, count: int, what: str) -> IntegerLines:
     return IntegerLines(text, at, values, starts, end)
 
 
+def check_blank(text: bytes, begin: int, end: int | None = None) -> None:
+    """Raise ReadError where something stands behind the lines that a file announces, up to an offset or the end."""
+    end = len(text) if end is None else end
+    if left := text[begin:end].lstrip():
+        raise in_line(text, end - len(left), "there are more lines than announced")
+
+
 def word_of(code: int) -> str:
     """Return the first seven characters of the word for which an integer stands."""
     return (code - np.iinfo(np.int64).min).to_bytes(8, "little").rstrip(b"\0").decode("latin-1")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import CODES, IntegerLines, Numbering, Runs, integer_lines, lines, without
+from meshfix_cli.meshfile.tables import CODES, IntegerLines, Numbering, Runs, check_blank, integer_lines, lines, without
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 from meshfix_cli.meshfile.together import Together
 
@@ -63,7 +63,7 @@ def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple
     with naming(".node"):
         text, at, (count, dimension, *_) = _head(nodes, 2)
         listed = lines(text, at, count, "point")
-        _check_end(text, listed.end)
+        check_blank(text, listed.end)
         if dimension not in (2, 3):
             raise ReadError(f"its points have {dimension} coordinates")
         coordinates = Places.of_text(listed.columns(1, 1 + dimension))
@@ -105,13 +105,8 @@ def _integers(data: bytes, counts: int) -> tuple[list[int], IntegerLines]:
     """Return what the first line tells behind the number of lines, and these."""
     text, at, (count, *others) = _head(data, counts)
     table = integer_lines(text, at, count, "line")
-    _check_end(text, table.end)
+    check_blank(text, table.end)
     return others, table
-
-
-def _check_end(text: bytes, end: int) -> None:
-    if left := text[end:].lstrip():
-        raise in_line(text, len(text) - len(left), "there are more lines than announced")
 
 
 def _corners(table: IntegerLines, count: int, before: int) -> Places:

@@ -19,6 +19,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
+from meshfix_cli.meshfile.tables import without
 from meshfix_cli.meshfile.text import integers, integers_at, words
 
 _COMMENT = re.compile(rb'#[^\n\r]*|"[^"\n\r]*"')  # or a text, in which the words are no keywords
@@ -88,7 +89,7 @@ def promoted(data: bytes) -> bytes:
 
 def _without_texts(data: bytes) -> bytes:
     """Return the data with blanks in the place of comments and texts, so that all else stands where it stood."""
-    return _COMMENT.sub(lambda text: b" " * len(text[0]), data) if b"#" in data or b'"' in data else data
+    return without(data, _COMMENT) if b"#" in data or b'"' in data else data
 
 
 def _sections(text: bytes, at: int) -> Iterator[_Section]:

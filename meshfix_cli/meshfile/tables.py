@@ -188,6 +188,7 @@ class Numbering:
     """
 
     def __init__(self, numbers: Int64) -> None:
+        self.numbers = numbers
         self.order: Int64 | None = None
         if not (numbers[1:] > numbers[:-1]).all():
             self.order = np.argsort(numbers, kind="stable")
@@ -206,6 +207,11 @@ class Numbering:
         at = numbers - self.sorted[0] if self._gapless else np.searchsorted(self.sorted, numbers)
         at = np.clip(at, 0, len(self.sorted) - 1)
         return np.where(self.sorted[at] == numbers, at if self.order is None else self.order[at], -1)
+
+    def between(self, first: int, last: int) -> Int64:
+        """Return the rows of all numbers in a range, by ascending numbers."""
+        here = slice(*np.searchsorted(self.sorted, [first, last + 1]).tolist())
+        return np.arange(len(self.sorted))[here] if self.order is None else self.order[here]
 
     def twice(self) -> int | None:
         """Return a number that is given twice."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.abaqus.keywords import Block, Deck
 from meshfix_cli.meshfile.source import Arrays
+from meshfix_cli.meshfile.tables import Numbering
 from meshfix_cli.meshfile.text import integers_at
 
 SECTION = "abaqus:section"
@@ -18,7 +19,7 @@ SECTION = "abaqus:section"
 _NO_NUMBER = re.compile(rb"[^\s\d,]")
 _NUMBER = re.compile(rb"[0-9]{1,18}")  # of 64 bits
 _EMPTY = np.empty(0, dtype=np.int64)
-_NOTHING = _EMPTY, _EMPTY, True
+_NOTHING = Numbering(_EMPTY), _EMPTY
 
 Sets = dict[tuple[str, str], NDArray[np.int64]]  # rows of points or cells for each scope and name in capitals
 
@@ -39,32 +40,27 @@ class Labels:
         scopes: dict[str, list[Block]] = {}
         for block in numbers:
             scopes.setdefault(block.scope, []).append(block)
-        self._sorted = {}
+        self._scopes = {}
         for scope, blocks in scopes.items():
-            ids = np.concatenate([numbers[block] for block in blocks])
-            order = np.argsort(ids, kind="stable")
-            ids = ids[order]
-            rows = np.concatenate([self.rows[block] for block in blocks])[order]
-            self._sorted[scope] = ids, rows, bool((np.diff(ids) == 1).all())
+            numbering = Numbering(np.concatenate([numbers[block] for block in blocks]))
+            self._scopes[scope] = numbering, np.concatenate([self.rows[block] for block in blocks])
 
     def rows_of(self, scope: str, numbers: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the rows (...) of numbers (...) of a scope; -1: there is none."""
-        ids, rows, gapless = self._sorted.get(scope, _NOTHING)
-        if not len(ids):
-            return np.full(numbers.shape, -1)
-        at = np.clip(numbers - ids[0] if gapless else np.searchsorted(ids, numbers), 0, len(ids) - 1)
-        return np.where(ids[at] == numbers, rows[at], -1)
+        numbering, rows = self._scopes.get(scope, _NOTHING)
+        at = numbering.rows_of(numbers)
+        return np.where(at >= 0, rows[at], -1) if len(rows) else at
 
     def generated(self, scope: str, first: int, last: int, step: int = 1) -> NDArray[np.int64]:
         """Return the rows of the numbers from the first to the last, in steps."""
-        ids, rows, _ = self._sorted.get(scope, _NOTHING)
-        here = slice(*np.searchsorted(ids, [first, last + 1]).tolist())
-        return rows[here][(ids[here] - first) % max(step, 1) == 0]
+        numbering, rows = self._scopes.get(scope, _NOTHING)
+        here = numbering.between(first, last)
+        return rows[here][(numbering.numbers[here] - first) % max(step, 1) == 0]
 
     def twice(self) -> int | None:
         """Return a number that is given twice in one scope."""
-        repeated = (ids[1:][ids[1:] == ids[:-1]] for ids, _, _ in self._sorted.values())
-        return next((int(ids[0]) for ids in repeated if len(ids)), None)
+        found = (numbering.twice() for numbering, _ in self._scopes.values())
+        return next((number for number in found if number is not None), None)
 
 
 def arrays(deck: Deck, nodes: Labels, elements: Labels, counts: Sequence[int], sections: Sequence[Block]) -> Arrays:

@@ -21,6 +21,7 @@ from meshfix_cli.meshfile.gmsh.sections import Block, File, Numbers, UnknownErro
 from meshfix_cli.meshfile.solved import solved_runs
 from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
+from meshfix_cli.meshfile.tables import Numbering
 
 _SETS, _ENTITY = "gmsh:physical_set", "gmsh:geometrical"
 
@@ -87,19 +88,10 @@ def _refuse() -> Places:
 
 def _finder(tags: Int64) -> Callable[[Int64], Int64]:
     """Return what finds the rows of nodes by their tags, which may be any numbers; -1: there is no such node."""
-    order = np.argsort(tags, kind="stable")
-    ordered = tags[order]
-    repeated = np.flatnonzero(ordered[1:] == ordered[:-1])
-    if len(repeated):
-        raise ReadError(f"is not a readable gmsh file: the node {ordered[repeated[0]]} stands twice in it")
-    return partial(_rows, ordered, order)
-
-
-def _rows(ordered: Int64, order: Int64, wanted: Int64) -> Int64:
-    if not len(ordered):
-        return np.full(wanted.shape, -1)
-    at = np.minimum(np.searchsorted(ordered, wanted), len(ordered) - 1)
-    return np.where(ordered[at] == wanted, order[at], -1)
+    numbering = Numbering(tags)
+    if (tag := numbering.twice()) is not None:
+        raise ReadError(f"is not a readable gmsh file: the node {tag} stands twice in it")
+    return numbering.rows_of
 
 
 def _vertices(block: Block, find: Callable[[Int64], Int64]) -> Int64:
@@ -201,8 +193,7 @@ def _view(numbers: Numbers, wanted: Int64) -> tuple[str, int, NDArray[np.float64
     if not titles or len(about) < 3 or about[1] < 1:
         raise ReadError("is not a readable gmsh file: data have no name or no size")
     tags, places = here.tagged(about[2], about[1])
-    order = np.argsort(tags, kind="stable")
-    rows = _rows(tags[order], order, wanted)
+    rows = Numbering(tags).rows_of(wanted)
     values = np.full((len(wanted), about[1]), np.nan)
     values[rows >= 0] = places.read(here.data)[rows[rows >= 0]]
     name = titles[0].decode("utf-8", "replace").strip().strip('"')

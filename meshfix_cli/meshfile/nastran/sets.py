@@ -19,7 +19,7 @@ def point_sets(deck: Deck, points: Numbering) -> dict[str, Int64]:
     for name in ("SPC", "SPC1"):
         for words in deck.fields(deck.where(name)).words():
             spans = _pairs(words[2:]) if name == "SPC1" else ((word, word) for word in words[1:8:3])
-            rows = [_between(points, int(a), int(b)) for a, b in spans if is_number(a) and is_number(b)]
+            rows = [points.between(int(a), int(b)) for a, b in spans if is_number(a) and is_number(b)]
             sets.setdefault(f"SPC {words[0] if words else ''}", []).extend(rows)
     return {name: np.unique(np.concatenate(rows)) for name, rows in sets.items() if rows}
 
@@ -30,12 +30,6 @@ def _pairs(words: Sequence[str]) -> Iterator[tuple[str, str]]:
         yield words[0], words[2]
         return
     yield from zip(words, words, strict=True)
-
-
-def _between(points: Numbering, first: int, last: int) -> Int64:
-    """Return the rows of the points whose numbers are in a range."""
-    here = slice(*np.searchsorted(points.sorted, [first, last + 1]).tolist())
-    return np.arange(len(points.sorted))[here] if points.order is None else points.order[here]
 
 
 def corners_of_systems(deck: Deck, points: Numbering) -> Int64:

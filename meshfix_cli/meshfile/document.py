@@ -17,7 +17,6 @@ from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import DRAWINGS, Format
-from meshfix_cli.meshfile.groups import groups_of
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
@@ -82,6 +81,8 @@ class Document:
 
     def groups(self) -> dict[str, dict[int, int]]:
         """Return how many cells each group of the file has, by name and by dimension, see `groups.Group.counts`."""
+        from meshfix_cli.meshfile.groups import groups_of  # which few runs ask for
+
         return {name: group.counts for name, group in groups_of(self.source).items()}
 
     def outputs(self, target: str, form: Format) -> tuple[str, ...]:
@@ -329,6 +330,8 @@ def _fixed_by(source: Source, name: str) -> NDArray[np.bool_]:
     if name in source.arrays.point:
         values = np.asarray(source.arrays.point[name])
         return (values.reshape(len(values), -1) != 0).any(axis=1)
+    from meshfix_cli.meshfile.groups import groups_of
+
     groups = groups_of(source)
     if name not in groups:
         known = listed(sorted({*source.arrays.point, *groups})) or "none"

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from meshfix_cli.errors import RequirementError, WriteError, listed
 from meshfix_cli.mesh.elements import counted, words
@@ -128,7 +128,11 @@ class Files:
 
 @dataclass(frozen=True)
 class Method:
-    """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `strategies.plan`."""
+    """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `strategies.plan`.
+
+    `slide` and `slide_interfaces` tell which vertices of the boundary and of interfaces move as well, where that does
+    not change the shape.
+    """
 
     strategy: str = "auto"
     sweeps: int | None = None
@@ -136,6 +140,16 @@ class Method:
     threshold: float | None = None
     max_move: Distance | None = None
     only_invalid: bool = False
+    slide: Literal["none", "flat"] = "none"
+    slide_interfaces: bool = True
+
+    def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
+        """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
+        if self.slide == "none":
+            return document
+        from meshfix_cli.meshfile.sliding import slid
+
+        return slid(document, self.slide_interfaces, reference)
 
     def reach(self, mesh: Mesh, threads: int) -> float:
         """Return how far vertices may move, in model units."""
@@ -228,6 +242,9 @@ class Judge:
         result = list(stages.values())[-1]
         self.check(document)
         shown = list(stages)[-1:] if self.brief else list(stages)  # nobody sees the others
+        most = None if self.brief else ceiling(result, self.threads)
+        if not (self.brief or command == "perturb"):
+            more["facts"] = {**(more.get("facts") or {}), **self._sliding(document, result, most)}
         asked = (one.name for one in self.requirements if one.is_metric)
         metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
         return Report(
@@ -237,7 +254,7 @@ class Judge:
             points=partial(document.file_points, result),
             ids=document.ids,
             stages={stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown},
-            ceiling=None if self.brief else ceiling(result, self.threads),
+            ceiling=most,
             obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
             fixed=document.fixed,
             not_judged=document.not_judged,
@@ -245,6 +262,23 @@ class Judge:
             requirements=self.requirements,
             **more,
         )
+
+
+    def _sliding(self, document: Document, result: Mesh, most: float | None) -> dict[str, Any]:
+        """Return how many vertices slide or, where none may, what might be gained: a ceiling above this one."""
+        from meshfix_cli.meshfile.sliding import slid
+        from meshfix_cli.quality.summary import ceiling
+
+        if result.freedom is not None:
+            moving = result.freedom.degrees[result.along_curve(result.movable)]
+            return {"sliding": {"lines": int((moving == 1).sum()), "planes": int((moving == 2).sum())}}
+        if most is None:
+            return {}
+        sliding = slid(document).mesh.with_points(result.points)
+        after = ceiling(sliding, self.threads)
+        if after is not None and not after > most:
+            return {}
+        return {"slide_flat": {"free_vertices": int(sliding.movable.sum()), "ceiling": after}}
 
 
 def repair(
@@ -281,6 +315,7 @@ def repair(
     from meshfix_cli.quality.summary import displacement
 
     judge.check(document)
+    document = method.freed(document, reference)
     threads = judge.threads
     reach = method.reach(document.mesh, threads)
     solve = partial(method.solve, threads=threads) if solve is None else solve

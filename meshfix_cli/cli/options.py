@@ -290,6 +290,20 @@ solving = packed(
     ),
     click.option("--max-move", type=LENGTH, help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
+    click.option(
+        "--slide",
+        type=click.Choice(("none", "flat")),
+        default="none",
+        show_default=True,
+        help="Let vertices of the boundary move where that does not change its shape. flat: in planes and on straight "
+        "edges; corners and what is curved stay.",
+    ),
+    click.option(
+        "--slide-interfaces/--no-slide-interfaces",
+        default=True,
+        show_default=True,
+        help="Whether vertices between regions slide as well.",
+    ),
 )
 drawing = packed(
     "draw",

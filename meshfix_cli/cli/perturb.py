@@ -6,7 +6,7 @@ import click
 
 from meshfix_cli.cli.files import open_files, report_stream
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, writing
-from meshfix_cli.repair import Files, Held
+from meshfix_cli.repair import Files, Held, Method
 from meshfix_cli.solve.perturb import Distance
 
 
@@ -14,11 +14,14 @@ from meshfix_cli.solve.perturb import Distance
 @writing
 @click.option("--percent", type=PERCENT, required=True, help="Of all vertices; interior ones move.")
 @click.option("--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")
+@click.option("--boundary", is_flag=True, help="Move vertices of a flat boundary as well, in its planes and edges.")
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @drawing
 @holding
 @reporting
-def perturb(files: Files, held: Held, show: Show, draw: Draw, percent: float, dist: Distance, seed: int) -> None:
+def perturb(
+    files: Files, held: Held, show: Show, draw: Draw, percent: float, dist: Distance, boundary: bool, seed: int
+) -> None:
     """Tangle a mesh as the paper does: move some interior vertices by a distance in random directions.
 
     With one seed, the same vertices move in the same directions whatever --percent and --dist are. Exits with 0
@@ -28,6 +31,8 @@ def perturb(files: Files, held: Held, show: Show, draw: Draw, percent: float, di
 
     draw.check()
     document, output = open_files(files, held, show.threads, *draw.names)
+    if boundary:
+        document = Method(slide="flat").freed(document)
     length = dist.length(document.mesh, show.threads)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
     result, notes = files.write(document, perturbed, output)

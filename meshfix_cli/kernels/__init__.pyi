@@ -136,6 +136,19 @@ class Connectivity:
     @property
     def colour_blocks(self) -> Int32: ...
 
+class Freedom:
+    """Where vertices may go, see mesh/freedom.hpp; copies of what it is given."""
+
+    def __init__(self, frame: Int32, directions: Uint8, axes: Float64, offsets: Int32, neighbours: Int32) -> None:
+        """Take the frame (n,) of each vertex, -1: it may go anywhere; the directions (f,) and axes (f, d, d) of frames.
+
+        The neighbours of a vertex in its line or plane begin at its offset (n + 1,); both may be empty where only
+        gradients are asked for.
+        """
+
+def joined(pairs: Int32, n: int) -> Int32:
+    """Number things (n,) so that those which pairs (p, 2) join have one number: the smallest of them."""
+
 def check_simplices(simplices: Int32, n: int, threads: int) -> tuple[int, int]:
     """The first row with a number outside 0 .. n-1, and the first that names a vertex twice; -1: none."""
 
@@ -193,6 +206,7 @@ def relocate(
     start: Float64,
     max_move: float,
     threads: int,
+    freedom: Freedom | None = None,
 ) -> tuple[int, int]:
     """Relocate, in place, the vertices that are due, of some blocks of one colour; the numbers visited and moved.
 
@@ -234,8 +248,11 @@ def embedding(
     edges: tuple[Int32, Int32],
     weights: Float64,
     threads: int,
+    freedom: Freedom | None = None,
 ) -> Float64:
     """Return the points (n, d) with each free one (n,) at the mean of its neighbours; needs the stars.
+
+    With a freedom, the neighbours are those in its line or plane.
 
     Where elements are not all simplices, the neighbours are those of `Connectivity.edges`, with weights (e,).
     """
@@ -258,6 +275,7 @@ class Foldover:
         radius: float,
         drawn: bool,
         threads: int,
+        freedom: Freedom | None = None,
     ) -> None:
         """Take a region's points (n, d), the free ones first; each free one has a ball around its centre (free, d).
 
@@ -302,6 +320,8 @@ def shape_energy(
     weight: float,
     sharpness: float,
     threads: int,
+    freedom: Freedom | None = None,
+    angle: float = ...,
 ) -> tuple[float, Float64]:
     """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge.
 
@@ -322,11 +342,13 @@ def shaped(
     sharpness: float,
     iterations: int,
     threads: int,
+    freedom: Freedom | None = None,
+    angle: float = ...,
 ) -> Float64:
     """Return the first `free` points (free, d) of a valid mesh where so many iterations of L-BFGS end.
 
     The goal and the floor are angles in degrees, the measure is in model units, `weight` is for what lacks a degree of
-    the goal.
+    the goal, and `angle` what a degree of a smallest angle is worth.
     """
 
 def min_norm_point(vectors: Float64) -> Float64:

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.elements import SIMPLICES
+from meshfix_cli.mesh.freedom import Freedom
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mixed import build_mixed, checked_blocks
 from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, read_only, refers_outside, rows_of
@@ -36,12 +37,15 @@ class Mesh:
         The free vertices.
     apart : bool
         Separate parts have coordinates of their own: that they overlap means nothing.
+    freedom : Freedom or None
+        Where those of the movable vertices may go that are on the boundary; None: there are none.
     """
 
     points: NDArray[np.float64]
     topology: Topology
     movable: NDArray[np.bool_]
     apart: bool = False
+    freedom: Freedom | None = None
 
     @classmethod
     def build(
@@ -121,6 +125,21 @@ class Mesh:
     def with_fixed(self, fixed: NDArray[np.bool_]) -> Mesh:
         """Return the same mesh with more vertices fixed, `fixed` (n,) bool."""
         return replace(self, movable=read_only(self.movable & ~fixed))
+
+    def sliding(self, freedom: Freedom, held: NDArray[np.bool_]) -> Mesh:
+        """Return the same mesh where the vertices that a freedom has lines and planes for move in these.
+
+        Those `held` (n,) bool do not.
+        """
+        slides = self.topology.of_vertices(freedom.frame >= 0)
+        return replace(self, freedom=freedom, movable=read_only(self.movable | (slides & ~held)))
+
+    @property
+    def anywhere(self) -> NDArray[np.bool_]:
+        """(n,) bool: the movable vertices that may go anywhere."""
+        if self.freedom is None:
+            return self.movable
+        return self.movable & ~self.topology.of_vertices(self.freedom.frame >= 0)
 
     def along_curve(self, values: NDArray[_T]) -> NDArray[_T]:
         """Return values (n, ...) of the points as those (k, ...) of the connectivity's vertices."""

@@ -100,6 +100,17 @@ class MixedTopology(Topology):
         mask[self.facets[between]] = True  # -1 marks what is cut off
         return self.of_vertices(mask[:-1])
 
+    def facets_between(
+        self, regions: NDArray[np.integer]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+        """Return the facets of the boundary and between regions, and their elements; see `Topology`."""
+        mesh = self.connectivity
+        label, mates = np.asarray(regions)[mesh.rows][mesh.facet_owners], mesh.facet_mates
+        chosen = np.flatnonzero((mates < 0) | (label[mates] > label))
+        width, beyond = 2 if self.dimension == 2 else WIDTH, mates[chosen]
+        across = np.where(beyond < 0, -1, mesh.facet_owners[beyond]).astype(np.int32)
+        return self.facets[chosen, :width], mesh.facet_owners[chosen], across
+
     def owners(self, simplices: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the elements of corner simplices; see `Topology`."""
         return self.connectivity.owners[simplices]

@@ -16,6 +16,10 @@ from meshfix_cli.mesh.elements import SIMPLICES, Element, Shape, counted
 _T = TypeVar("_T", bound=np.generic)
 
 
+# By the position of a corner, those of the facet opposite it, in positive order seen from outside.
+_OPPOSITE = {d: np.array(element.shape.facets) for d, element in SIMPLICES.items()}
+
+
 @dataclass(frozen=True, eq=False)
 class Block:
     """The elements of one type.
@@ -234,6 +238,20 @@ class Topology:
         result = np.empty_like(values)
         result[self.connectivity.rows] = values
         return result
+
+    def facets_between(
+        self, regions: NDArray[np.integer]
+    ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+        """Return the facets (f, w) of the boundary and between regions (m,), each once.
+
+        With the element (f,) that each is of, and the one across, -1: none. All in the numbers of the connectivity,
+        from outside of that element, which has the lower region; -1: no more vertices.
+        """
+        mesh, corners = self.connectivity, self.dimension + 1
+        label = np.asarray(regions)[mesh.rows]
+        row, position = np.nonzero((mesh.mates < 0) | (label[mesh.mates // corners] > label[:, None]))
+        across = mesh.mates[row, position] // corners
+        return mesh.simplices[row[:, None], _OPPOSITE[self.dimension][position]], row.astype(np.int32), across
 
     def _mark_facets(self, facets: NDArray[np.bool_]) -> NDArray[np.bool_]:
         mesh, corners = self.connectivity, self.dimension + 1

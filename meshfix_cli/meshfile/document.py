@@ -23,6 +23,8 @@ from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 
 FREE = "none"  # the name of no array of regions, by which interfaces are freed
+# Reasons to hold vertices that may slide all the same, where they are asked to.
+ON_BOUNDARY, BETWEEN, ON_CELLS = "on the boundary", "between regions of", "on other cells of the file"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +40,6 @@ class Document:
     ids : (m,) int64
         For each element of the mesh the number that the file gives to its cell, or, where it gives none, the position
         of this among all cells of the file, from 0.
-    fixed : dict
-        Number of vertices held for each reason; a vertex counts for the first that applies.
     not_judged : dict
         Number of elements of each type that are of the mesh's dimension, held, and not judged.
     notes : tuple of str
@@ -49,6 +49,10 @@ class Document:
         Which cells of the file the elements are, repetitions included.
     basis : (2, 3) float64 or None
         Spans the plane of a planar mesh in space.
+    holds : dict
+        For each reason the vertices (n,) bool that it holds.
+    regions : tuple of (m,) int64
+        Numbers of the regions that the elements are of, for each array whose interfaces are held.
     copies : (n,) int64 or None
         For each point the one that stands for it in the mesh, where points at one place are joined.
     arbitrary : (m,) bool or None
@@ -59,14 +63,24 @@ class Document:
     mesh: Mesh
     format: Format
     ids: NDArray[np.int64]
-    fixed: dict[str, int]
     not_judged: dict[str, int]
     notes: tuple[str, ...]
     source: Source = field(repr=False)
     solved: Solved = field(repr=False)
     basis: NDArray[np.float64] | None
+    holds: dict[str, NDArray[np.bool_]] = field(repr=False)
+    regions: tuple[NDArray[np.int64], ...] = field(repr=False)
     copies: NDArray[np.int64] | None = None
     arbitrary: NDArray[np.bool_] | None = None
+
+    @property
+    def fixed(self) -> dict[str, int]:
+        """Number of vertices held for each reason; a vertex counts for the first that applies."""
+        left, fixed = self.mesh.topology.used & ~self.mesh.movable, {}
+        for reason, mask in self.holds.items():
+            fixed[reason] = int((mask & left).sum())
+            left = left & ~mask
+        return {reason: count for reason, count in fixed.items() if count}
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -190,7 +204,7 @@ def build(
     copies = _copies(points, solved) if join_points else None
     if copies is not None:
         solved = solved_of([_joined(run, copies) for run in source.cells])
-    held = {"on other cells of the file": _on_other_cells(solved, len(points))}
+    held = {ON_CELLS: _on_other_cells(solved, len(points))}
     if source.held is not None:
         held["by the file"] = source.held
     named = {one: _fixed_by(source, one) for one in fix}
@@ -200,7 +214,7 @@ def build(
     if not source.oriented:  # the numbering says nothing
         mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
     topology = mesh.topology
-    reasons = {"on the boundary": topology.boundary}
+    holds, between = {ON_BOUNDARY: topology.boundary}, []
     for key in () if free else source.regions:
         labels = solved.of_elements(source.arrays.cell[key])
         if key not in REGIONS and key != regions and not _are_labels(labels):
@@ -208,22 +222,34 @@ def build(
         if labels.ndim != 1:
             components = counted(labels.shape[1], "component", "components")
             raise ReadError(f"the cell data {key!r} are not labels of regions: they have {components}")
-        reasons[f"between regions of {key}"] = topology.interface(_region_codes(labels, solved, topology))
-    fixed = {}
+        between.append(_region_codes(labels, solved, topology))
+        holds[f"{BETWEEN} {key}"] = topology.interface(between[-1])
     if copies is not None:
         held = {reason: _of_copies(mask, copies) for reason, mask in held.items()}
-    for reason, mask in {**reasons, **held}.items():
-        those = mask & (mesh.movable | topology.boundary) if reason == "on the boundary" else mask & mesh.movable
-        fixed[reason] = int(those.sum())
+    holds |= held
+    for mask in holds.values():
         mesh = mesh.with_fixed(mask)
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
     seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
     notes = (*source.notes, *_notes(mesh, solved, seen_from_above, copies), *_concave(mesh, form))
     notes += tuple(f"--fix {one} holds no vertex: there is none in it" for one, mask in named.items() if not mask.any())
-    fixed = {reason: count for reason, count in fixed.items() if count}
     ids = solved.of_elements(_ids(source))
     ids = ids if topology.m == len(ids) else ids[topology.source]
-    return Document(name, mesh, form, ids, fixed, solved.not_judged(), notes, source, solved, basis, copies, arbitrary)
+    return Document(
+        name,
+        mesh,
+        form,
+        ids,
+        solved.not_judged(),
+        notes,
+        source,
+        solved,
+        basis,
+        holds,
+        tuple(between),
+        copies,
+        arbitrary,
+    )
 
 
 def with_reversed(source: Source, cells: Mapping[int, Turned]) -> Source:

@@ -143,9 +143,9 @@ def _exclusive(
     """Return rows of the connectivity; some of these inverted corner simplices, of one free vertex, are theirs."""
     if not len(inverted):
         return inverted
-    stars = mesh.topology.stars(threads)
+    stars, anywhere = mesh.topology.stars(threads), mesh.along_curve(mesh.anywhere)
     corners = stars.simplices[inverted]
-    found = kernels.exclusive(points, stars, movable, distinct(corners[movable[corners]]), threads)
+    found = kernels.exclusive(points, stars, movable, distinct(corners[anywhere[corners]]), threads)
     return mesh.topology.owners(found)
 
 

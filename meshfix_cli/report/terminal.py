@@ -27,6 +27,7 @@ from meshfix_cli.report.facts import (
     processes,
     quality_rows,
     required,
+    sliding,
     title,
     verdict,
 )
@@ -65,7 +66,7 @@ def print_report(report: Report, out: Console, by_type: bool = False) -> None:
         _line(out, text)
     for rank, text in enumerate(processes(report)):
         _line(out, f"process {rank}: {text}")
-    for note in report.notes:
+    for note in (*report.notes, *sliding(report)):
         _line(out, f"note: {note}")
     for text in verdict(report):
         _line(out, text, "bold green" if report.valid else "bold red")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from meshfix_cli import kernels
 from meshfix_cli.solve.foldover import evened
 from meshfix_cli.solve.region import Region
 from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.freedom import Freedom
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -23,7 +27,14 @@ POOR, POOR_OF_UNEVEN, UNEVEN = 0.62, 0.7, 0.25
 
 
 def evened_where_poor(
-    smallest: float, mean: float, goal: Goal, threads: int, stars: kernels.Connectivity, points: Array, free: Mask
+    smallest: float,
+    mean: float,
+    goal: Goal,
+    threads: int,
+    freedom: Freedom | None,
+    stars: kernels.Connectivity,
+    points: Array,
+    free: Mask,
 ) -> Iterator[Array]:
     """Yield the points (n, d) with even sizes and then the best shape, where scaled Jacobians are poor.
 
@@ -35,6 +46,8 @@ def evened_where_poor(
         Of the shape.
     threads : int
         The points have the same bits for any number.
+    freedom : Freedom or None
+        Where the free vertices may go.
     stars : Connectivity
     points : (n, d) float64
         Of a valid mesh.
@@ -45,8 +58,8 @@ def evened_where_poor(
     sizes = kernels.measure(points, stars.simplices, threads)[0]
     uneven = np.percentile(sizes, 1, method="lower") < UNEVEN * sizes.mean()
     if smallest < (POOR_OF_UNEVEN if uneven else POOR) * min(mean, ceiling(points, stars, free)):
-        even = evened(points, stars, free, threads, ITERATIONS)
-        yield shaped(even, stars, free, goal, threads, FEW_ITERATIONS)
+        even = evened(points, stars, free, threads, ITERATIONS, freedom)
+        yield shaped(even, stars, free, goal, threads, FEW_ITERATIONS, freedom)
 
 
 def ceiling(points: Array, mesh: kernels.Connectivity, free: Mask) -> float:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import JUDGED
 from meshfix_cli.solve.chords import inverse_lengths
 from meshfix_cli.solve.region import Region
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.freedom import Freedom
 
 Array = NDArray[np.float64]
 
@@ -84,6 +88,7 @@ def minimisations(
     reach: Reach,
     threads: int,
     efforts: tuple[Effort, ...] = (QUICK, THOROUGH),
+    freedom: Freedom | None = None,
 ) -> Iterator[Array]:
     """Yield the points (n, d) after each minimisation over the free vertices, until the targets are used up.
 
@@ -103,13 +108,15 @@ def minimisations(
         The points have the same bits for any number.
     efforts : tuple of Effort
         All of that is tried with one after the other.
+    freedom : Freedom, optional
+        Where the free vertices may go.
     """
     if not (free.any() and reach.distance > 0):
         return
-    region = _Region(mesh, free, reach, threads)
+    region = _Region(mesh, free, reach, threads, freedom)
     for effort in efforts:
         yield from region.minimise(points, region.uniform(points), effort)
-        embedded = embedding(points, mesh, free, threads)
+        embedded = embedding(points, mesh, free, threads, freedom)
         sizes = region.sizes(embedded)
         yield from region.minimise(points, sizes, effort)
         yield from region.minimise(embedded, sizes, effort)  # its positions are drawn into reach
@@ -119,6 +126,7 @@ def minimisations_in_regions(
     regions: tuple[int | None, ...],
     max_move: float,
     threads: int,
+    freedom: Freedom | None,
     stars: kernels.Connectivity,
     points: Array,
     start: Array,
@@ -133,7 +141,7 @@ def minimisations_in_regions(
             return  # as good as the whole mesh
         efforts = (QUICK, THOROUGH) if rings is None else (QUICK,)
         fewest, waited = len(stars.simplices), 0
-        for moved in minimisations(points, stars, near, reach, threads, efforts):
+        for moved in minimisations(points, stars, near, reach, threads, efforts, freedom):
             points = moved
             yield points
             left = len(kernels.check(points, stars.simplices, threads)[0])
@@ -142,11 +150,15 @@ def minimisations_in_regions(
             if rings is not None and waited == REGION_PATIENCE:
                 break
         if rings is None:
-            yield from drawn_into_reach(stars, near, reach, threads)
+            yield from drawn_into_reach(stars, near, reach, threads, freedom)
 
 
 def drawn_into_reach(
-    mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int
+    mesh: kernels.Connectivity,
+    free: NDArray[np.bool_],
+    reach: Reach,
+    threads: int,
+    freedom: Freedom | None = None,
 ) -> Iterator[Array]:
     """Yield the points (n, d) of a valid mesh that was found where vertices may go anywhere, when all are in reach.
 
@@ -155,8 +167,8 @@ def drawn_into_reach(
     """
     if not (free.any() and 0 < reach.distance < math.inf):
         return
-    region = _Region(mesh, free, reach, threads)
-    for points in minimisations(reach.start, mesh, free, Reach(reach.start), threads):
+    region = _Region(mesh, free, reach, threads, freedom)
+    for points in minimisations(reach.start, mesh, free, Reach(reach.start), threads, freedom=freedom):
         if region.is_valid(points):
             yield from region.draw(points)
             return
@@ -170,6 +182,7 @@ def minimisations_to(
     reach: Reach,
     threads: int,
     until_valid: bool = True,
+    freedom: Freedom | None = None,
 ) -> Iterator[Array]:
     """Yield the points (n, d) after each minimisation, with a target of its own shape for each simplex.
 
@@ -182,10 +195,12 @@ def minimisations_to(
     until_valid : bool
         End where all simplices of the region are valid. Otherwise the points are valid already, and stay so: each
         minimisation goes on from the last.
+    freedom : Freedom, optional
+        Where the free vertices may go.
     """
     if not (free.any() and reach.distance > 0):
         return
-    region = _Region(mesh, free, reach, threads)
+    region = _Region(mesh, free, reach, threads, freedom)
     targets = np.ascontiguousarray(inverses[region.rows])
     if until_valid:
         yield from (moved for effort in (QUICK, THOROUGH) for moved in region.minimise(points, targets, effort))
@@ -193,18 +208,32 @@ def minimisations_to(
         yield from region.approach(points, targets)
 
 
-def evened(points: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int, iterations: int) -> Array:
+def evened(
+    points: Array,
+    mesh: kernels.Connectivity,
+    free: NDArray[np.bool_],
+    threads: int,
+    iterations: int,
+    freedom: Freedom | None = None,
+) -> Array:
     """Return valid points (n, d) on the way from others to where the energy of the uniform target is smallest.
 
     The parameters are those of `minimisations`.
     """
-    return _Region(mesh, free, Reach(points), threads).even(points, iterations)
+    return _Region(mesh, free, Reach(points), threads, freedom).even(points, iterations)
 
 
-def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_], threads: int = 1) -> Array:
+def embedding(
+    start: Array,
+    mesh: kernels.Connectivity,
+    free: NDArray[np.bool_],
+    threads: int = 1,
+    freedom: Freedom | None = None,
+) -> Array:
     """Put each free vertex at the mean of its neighbours: the solution of the graph's Laplace equation.
 
     Where elements are not all simplices, the neighbours are those along edges, with the weights of `inverse_lengths`.
+    Vertices that slide come first, each among those in its line, and then in its plane.
 
     Returns
     -------
@@ -212,15 +241,31 @@ def embedding(start: Array, mesh: kernels.Connectivity, free: NDArray[np.bool_],
         In the plane valid wherever the boundary is convex. Source: W. T. Tutte, "How to draw a graph", Proceedings of
         the London Mathematical Society 13 (1963).
     """
-    return kernels.embedding(start, mesh, free, *inverse_lengths(start, mesh, free, threads), threads)
+    points = start
+    if freedom is not None:
+        none = (np.empty(0, dtype=np.int32),) * 2
+        for degrees in (1, 2):
+            some = free & (freedom.degrees == degrees)
+            if some.any():
+                points = kernels.embedding(points, mesh, some, none, np.empty(0), threads, freedom.kernel)
+        points, free = freedom.onto(points, start), free & (freedom.degrees == 0)
+    return kernels.embedding(points, mesh, free, *inverse_lengths(points, mesh, free, threads), threads)
 
 
 class _Region(Region):
     """The stars of the free vertices, and how far these may go."""
 
-    def __init__(self, mesh: kernels.Connectivity, free: NDArray[np.bool_], reach: Reach, threads: int) -> None:
+    def __init__(
+        self,
+        mesh: kernels.Connectivity,
+        free: NDArray[np.bool_],
+        reach: Reach,
+        threads: int,
+        freedom: Freedom | None = None,
+    ) -> None:
         super().__init__(mesh, free)
         self.reach, self.threads = reach, threads
+        self.freedom = None if freedom is None else freedom.of(self.moving)
         self.codes = None if mesh.simplicial else mesh.codes[mesh.owners[self.rows]]
 
     def uniform(self, points: Array) -> Array:
@@ -314,7 +359,7 @@ class _Region(Region):
         """Make the energy of targets (s,), or of the inverse matrices (s, d, d) of those."""
         return kernels.Foldover(
             start[self.vertices], self.simplices, targets, self.reach.start[self.moving], self.reach.distance, drawn,
-            self.threads,
+            self.threads, self.freedom,
         )  # fmt: skip
 
     def _moved(self, start: Array, problem: kernels.Foldover) -> Array:

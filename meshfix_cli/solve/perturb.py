@@ -37,8 +37,9 @@ class Distance:
 def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple[Mesh, int]:
     """Move some interior vertices by a distance in random directions.
 
-    From the seed come one permutation of the free vertices and one direction for every vertex; so in a series
-    of percentages or distances the same vertices move in the same directions.
+    Those of the boundary that slide move in their lines and planes. From the seed come one permutation of the free
+    vertices and one direction for every vertex; so in a series of percentages or distances the same vertices move in
+    the same directions.
 
     Parameters
     ----------
@@ -64,8 +65,15 @@ def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple
     random = np.random.default_rng(seed)
     order = random.permutation(np.flatnonzero(mesh.movable))
     directions = random.standard_normal(mesh.points.shape)
+    if mesh.freedom is not None:
+        start = mesh.along_curve(mesh.points)
+        ways = mesh.freedom.onto(start + mesh.along_curve(directions), start) - start
+        directions[mesh.topology.connectivity.vertices] = ways
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     chosen = order[: round(percent / 100 * int(mesh.topology.used.sum()))]
     points = mesh.points.copy()
     points[chosen] += distance * directions[chosen]
-    return mesh.with_points(points), len(chosen)
+    moved = mesh.with_points(points)
+    if mesh.freedom is not None:
+        moved = mesh.with_vertices(mesh.freedom.onto(mesh.along_curve(points), start))
+    return moved, len(chosen)

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
+from meshfix_cli.solve.passes import Passes
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, SHARPNESS, Goal, shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
@@ -44,29 +45,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _Start = tuple[Array, SweepRecord, tuple[int, float]]
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
-
-
-@dataclass(frozen=True, eq=False)
-class _Passes:
-    """Passes of smoothing that were run to choose a start: the first ones of the smoothing that begins there.
-
-    Attributes
-    ----------
-    near : (k,) bool
-        The vertices that might move.
-    points : list of (k, d) float64
-        Before the first pass, and after each.
-    states : (k,) uint8
-        After the last.
-    """
-
-    near: Mask
-    points: list[Array]
-    states: NDArray[np.uint8]
-
-    def begin(self, points: Array, near: Mask, phase: Phase) -> bool:
-        """Whether a phase begins with them."""
-        return phase.moves == (Move.COMBINED_SMOOTH,) and points is self.points[0] and np.array_equal(near, self.near)
 
 
 def _raised(sine2: float, degrees: float) -> float:
@@ -101,6 +79,7 @@ class Run:
         self.input, self.threshold_sine2, self.threads, self.team = mesh, threshold_sine2, threads, team
         self.stars, self.max_move = mesh.topology.stars(threads), max_move
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
+        self.inside, self.freedom = mesh.along_curve(mesh.anywhere), mesh.freedom
         stuck = mesh.stuck(threads)
         fixed = Judged(self.stars, stuck)
         inverted = fixed.check(self.points, threads)[0]
@@ -127,7 +106,7 @@ class Run:
         self.near = self.free & self.broken if only_invalid else self.free
         self.reference, self.targeted = reference, reference is not None
         self.rival: _Start | None = None
-        self.ahead: _Passes | None = None
+        self.ahead: Passes | None = None
         self.kept: tuple[Array, SweepRecord, float] | None = None
         self.lost = False  # what the last minimisation of the shape began with
         self.shaped = False  # since the smallest angle was raised
@@ -236,14 +215,14 @@ class Run:
             self.best, self.ahead = (one, ahead) if first else (other, its_ahead)
         return self._return_to(*self.best[:2])
 
-    def _passes_from(self, start: Array) -> tuple[float, int, _Passes]:
+    def _passes_from(self, start: Array) -> tuple[float, int, Passes]:
         """Return the smallest of the smallest angles after a few passes, in radians, their sum, in steps, and these."""
         near = self.near & self.team.own_vertices
         states, points = _due(near), [start]
         for _ in range(PASSES):
             points.append(self._relocated(points[-1], Move.COMBINED_SMOOTH, states))
         angles = self._angles(points[-1])
-        return self._least(angles), self.team.total(self._steps(angles)), _Passes(near, points, states)
+        return self._least(angles), self.team.total(self._steps(angles)), Passes(near, points, states)
 
     def is_done(self, phase: Phase) -> bool:
         """Whether nothing is left for a phase of untangling: sweeps are cheap, the energy needs a promise."""
@@ -345,9 +324,10 @@ class Run:
         def compute(stars: kernels.Connectivity, points: Array, start: Array, near: Mask) -> Iterator[Array]:
             from meshfix_cli.solve.foldover import Reach, embedding
 
-            yield Reach(start, self.max_move).drawn_in(embedding(points, stars, near, self.threads))
+            embedded = embedding(points, stars, near, self.threads, self.team.freedom)
+            yield Reach(start, self.max_move).drawn_in(embedded)
 
-        yield from self.team.of_whole(compute, self.points, self.first[0], self.near)
+        yield from self._of_whole(compute, self.points, self.first[0], self.near)
 
     def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
@@ -363,9 +343,9 @@ class Run:
         aims = Goal(goal, floor, max(self.min_measure, 0.0), sharpness)
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
-            yield shaped(points, stars, free, aims, self.threads, most)
+            yield shaped(points, stars, free, aims, self.threads, most, self.team.freedom)
 
-        yield from self.team.of_whole(compute, self.points, self._smoothed(phase))
+        yield from self._of_whole(compute, self.points, self._smoothed(phase))
 
     def _even(self) -> Iterator[Array]:
         """Yield the points with even sizes and then the best shape, if smallest and mean are larger."""
@@ -377,8 +357,8 @@ class Run:
         total, smallest = self.team.total(self._steps(np.sin(angles))), math.sin(self._least(angles))
         mean = total / ANGLE_STEPS / self.count
         aims = Goal(math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT, 0.0, max(self.min_measure, 0.0))
-        compute = partial(even.evened_where_poor, smallest, mean, aims, self.threads)
-        for points in self.team.of_whole(compute, self.points, self.free):
+        compute = partial(even.evened_where_poor, smallest, mean, aims, self.threads, self.team.freedom)
+        for points in self._of_whole(compute, self.points, self.free):
             there = self._angles(points)
             if math.sin(self._least(there)) > smallest and self.team.total(self._steps(np.sin(there))) > total:
                 yield points
@@ -468,7 +448,7 @@ class Run:
         for blocks in self.team.sweep(points, states):
             kernels.relocate(
                 move, points, states, self.stars, blocks, threshold_sine2, self.floor, self.first[0], self.max_move,
-                self.threads,
+                self.threads, None if self.freedom is None else self.freedom.kernel,
             )  # fmt: skip
         return points
 
@@ -491,10 +471,18 @@ class Run:
 
         compute = partial(getattr(layers if phase.layers else towards, phase.to_reference), self.max_move, self.threads)
         reference = () if self.reference is None or phase.layers else (self.reference,)
-        return self.team.of_whole(compute, self.points, self.first[0], *reference, self.free)
+        if phase.layers or phase.to_reference == "follow":
+            return self._of_whole(compute, self.points, self.first[0], *reference, self.inside)
+        compute = partial(compute, freedom=self.team.freedom)
+        return self._of_whole(compute, self.points, self.first[0], *reference, self.free)
 
     def _minimisations(self, phase: Phase) -> Iterator[Array]:
         from meshfix_cli.solve.foldover import minimisations_in_regions
 
-        compute = partial(minimisations_in_regions, phase.rings, self.max_move, self.threads)
-        return self.team.of_whole(compute, self.points, self.first[0], self.free, self._broken())
+        compute = partial(minimisations_in_regions, phase.rings, self.max_move, self.threads, self.team.freedom)
+        return self._of_whole(compute, self.points, self.first[0], self.free, self._broken())
+
+    def _of_whole(self, compute: Callable[..., Iterator[Array]], *values: NDArray[Any]) -> Iterator[Array]:
+        """Yield what `Team.of_whole` does, with those that slide where they may be: rounding leads off a plane."""
+        for points in self.team.of_whole(compute, *values):
+            yield points if self.freedom is None else self.freedom.onto(points, self.first[0])

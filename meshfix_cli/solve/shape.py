@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +12,15 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import JUDGED
 from meshfix_cli.solve.region import Region
 
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.freedom import Freedom
+
 Array = NDArray[np.float64]
 
 ITERATIONS = 100  # of "best"
 FEW_ITERATIONS = 20  # of the default
 SHARPNESS = 15.0  # of their judgement: see kernels/moves/shape.hpp
+ANGLE_OF_SLIDING = 1.0  # what a degree is worth where the boundary slides: its elements gain more in angles
 WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
 
 
@@ -48,6 +53,7 @@ def shaped(
     goal: Goal,
     threads: int,
     iterations: int = ITERATIONS,
+    freedom: Freedom | None = None,
 ) -> Array:
     """Return the points (n, d) with the free ones (n,) where mean ratios and smallest angles are best together.
 
@@ -63,12 +69,15 @@ def shaped(
         The points have the same bits for any number.
     iterations : int
         At most.
+    freedom : Freedom, optional
+        Where the free vertices may go.
     """
     region = Region(mesh, free)
     moved = points.copy()
     moved[region.moving] = kernels.shaped(
         points[region.vertices], region.simplices, corner_weights(mesh, region), _owners(mesh, region),
-        len(region.moving), goal.angle, goal.floor, goal.measure, WEIGHT, goal.sharpness, iterations, threads,
+        len(region.moving), goal.angle, goal.floor, goal.measure, WEIGHT, goal.sharpness, iterations,
+        threads, *() if freedom is None else (freedom.of(region.moving), ANGLE_OF_SLIDING),
     )  # fmt: skip
     return region.retreated(points, moved, goal.measure, threads)
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from meshfix_cli.mesh.freedom import Freedom
     from meshfix_cli.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -27,10 +28,13 @@ class Team(Protocol):
     own_vertices : (n,) bool
     own_elements : (m,) bool
         Each element is some process's own, and only one's.
+    freedom : Freedom or None
+        That of the whole mesh, in the process that computes for it.
     """
 
     own_vertices: Mask
     own_elements: Mask
+    freedom: Freedom | None
 
     def total(self, count: int) -> int:
         """Return the sum of a number over all processes."""
@@ -69,6 +73,7 @@ class Alone:
         self.stars, self.colours = mesh.topology.stars(threads), mesh.topology.colours
         self.own_vertices = np.ones(len(self.stars.vertices), dtype=bool)
         self.own_elements = np.ones(len(self.stars.rows), dtype=bool)
+        self.freedom = mesh.freedom
 
     def total(self, count: int) -> int:
         """Return the number."""

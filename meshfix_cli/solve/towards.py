@@ -9,12 +9,16 @@ the reference as its targets mends what is left, and is then minimised to the en
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.solve.foldover import Reach, minimisations_to
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.freedom import Freedom
 
 Array = NDArray[np.float64]
 
@@ -48,20 +52,20 @@ def follow(
 
 def mend(
     max_move: float, threads: int, mesh: kernels.Connectivity, points: Array, start: Array, reference: Array,
-    free: NDArray[np.bool_],
+    free: NDArray[np.bool_], freedom: Freedom | None = None,
 ) -> Iterator[Array]:  # fmt: skip
     """Yield points after each minimisation of the energy, until all is valid."""
     targets = inverses(reference, mesh.simplices)
-    return minimisations_to(points, mesh, free, targets, Reach(start, max_move), threads)
+    return minimisations_to(points, mesh, free, targets, Reach(start, max_move), threads, freedom=freedom)
 
 
 def approach(
     max_move: float, threads: int, mesh: kernels.Connectivity, points: Array, start: Array, reference: Array,
-    free: NDArray[np.bool_],
+    free: NDArray[np.bool_], freedom: Freedom | None = None,
 ) -> Iterator[Array]:  # fmt: skip
     """Yield valid points after each minimisation from valid ones."""
     targets = inverses(reference, mesh.simplices)
-    return minimisations_to(points, mesh, free, targets, Reach(start, max_move), threads, until_valid=False)
+    return minimisations_to(points, mesh, free, targets, Reach(start, max_move), threads, False, freedom)
 
 
 def followed(points: Array, mesh: kernels.Connectivity, reference: Array, free: NDArray[np.bool_]) -> Array:

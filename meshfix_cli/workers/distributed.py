@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import MeshfixError, on_one_line
+from meshfix_cli.mesh.freedom import Freedom
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.mixed import MixedTopology
@@ -67,6 +68,8 @@ class Part:
         How far vertices may move, in model units.
     reference : (n, d) float64 or None
         Where they were before the boundary moved.
+    freedom : Freedom or None
+        Where they may go.
     """
 
     vertices: Numbers
@@ -82,6 +85,7 @@ class Part:
     block_colours: Numbers
     reach: float
     reference: Array | None = None
+    freedom: Freedom | None = None
 
     def topology(self, threads: int) -> Topology:
         """Return the topology of the part."""
@@ -222,7 +226,7 @@ def _solved(
     watch: Callable[[Steps], Steps] = iter,
 ) -> tuple[Mesh | None, Mesh | None, Mesh | None, tuple[SweepRecord, ...], tuple[RankRecord, ...]]:
     """Solve one part; the root gets the whole mesh as it came, untangled and smoothed, the others None."""
-    team = Ranks(comm, part, None if whole is None else whole.topology.stars(threads), threads)
+    team = Ranks(comm, part, whole, threads)
     *stages, records = drain(watch(method.steps(team.mesh, part.reach, threads, part.hopeless, team, part.reference)))
     known = {id(stages[0]): whole}
     for stage in stages:
@@ -265,6 +269,7 @@ def parts(
             np.zeros(len(rows), dtype=bool) if hopeless is None else hopeless[rows],
             owner[ghosts], colour[ghosts // kernels.BLOCK_SIZE], colour[blocks], reach,
             None if reference is None else reference[vertices],
+            None if mesh.freedom is None else mesh.freedom.part(vertices, len(own)),
         )  # fmt: skip
 
 
@@ -335,11 +340,13 @@ class _Travelling(NamedTuple):
 class Ranks:
     """The processes of a communicator; see `team.Team`."""
 
-    def __init__(self, comm: Intracomm, part: Part, whole: kernels.Connectivity | None, threads: int) -> None:
-        self.comm, self.part, self.whole = comm, part, whole
+    def __init__(self, comm: Intracomm, part: Part, whole: Mesh | None, threads: int) -> None:
+        self.comm, self.part = comm, part
+        self.whole = None if whole is None else whole.topology.stars(threads)
+        self.freedom = None if whole is None else whole.freedom
         self.messages, self.bytes = 0, 0
         topology = part.topology(threads)
-        self.mesh = Mesh(part.points, topology, part.movable)
+        self.mesh = Mesh(part.points, topology, part.movable, freedom=part.freedom)
         self.stars = topology.stars(threads)
         self.own_vertices = np.arange(len(part.vertices)) < part.own
         self.own_elements = part.own_elements

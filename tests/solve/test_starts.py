@@ -13,7 +13,8 @@ from meshes import tangle
 from meshfix_cli import Mesh, untangle
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise
-from meshfix_cli.solve.run import GAIN, _Passes
+from meshfix_cli.solve.passes import Passes
+from meshfix_cli.solve.run import GAIN
 from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, plan
 from meshfix_cli.solve.untangle import drain, steps
 
@@ -70,15 +71,15 @@ def test_the_passes_that_chose_the_start_are_those_of_smoothing(name: str, monke
     mesh = Mesh.build(*MESHES[name]()) if name in MESHES else Mesh.build(*GEOMETRIES[name]())
     middle = mesh.points[mesh.movable].mean(axis=0)
     tangled = mesh.with_points(np.where(mesh.movable[:, None], middle, mesh.points))
-    used, begin = [], _Passes.begin
+    used, begin = [], Passes.begin
 
     def noted(*given: Any) -> bool:
         used.append(begin(*given))
         return used[-1]
 
-    monkeypatch.setattr(_Passes, "begin", noted)
+    monkeypatch.setattr(Passes, "begin", noted)
     known = untangle(tangled)
-    monkeypatch.setattr(_Passes, "begin", lambda *_: False)
+    monkeypatch.setattr(Passes, "begin", lambda *_: False)
     anew = untangle(tangled)
     assert True in used
     assert known.after.points.tobytes() == anew.after.points.tobytes()

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.freedom import constraints_of, freedom_of
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.solve.perturb import perturb
 from meshfix_cli.solve.strategies import Move
@@ -18,6 +19,13 @@ from meshfix_cli.solve.strategies import Move
 def tangle(mesh: Mesh, percent: float = 25, distance: float = 2, seed: int = 0) -> Mesh:
     """The paper's protocol; the distance in mean edge lengths."""
     return perturb(mesh, percent, distance * mesh.mean_edge_length(), seed)[0]
+
+
+def sliding(mesh: Mesh, regions: NDArray[np.int64] | None = None) -> Mesh:
+    """Let all of the flat boundary slide."""
+    points = mesh.along_curve(mesh.points)
+    freedom = freedom_of(points, constraints_of(mesh.topology, points, regions))
+    return mesh.sliding(freedom, np.zeros(len(mesh.points), dtype=bool))
 
 
 def star_rows(mesh: Mesh, vertex: int) -> tuple[NDArray[np.int32], NDArray[np.uint16], NDArray[np.int32]]:

@@ -20,7 +20,7 @@ import elements
 import generate
 from building import Blocks
 from layered import Points, body_of, layered, left_behind
-from meshes import tangle, with_an_inverted_fixed_simplex
+from meshes import sliding, tangle, with_an_inverted_fixed_simplex
 
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.reference import reference_points
@@ -64,6 +64,10 @@ METHODS = {
     "fewsolids": Method(smooth="best"),
     "quads": Method(smooth="best"),
     "solidsreference": Method(),
+    "sliding": Method(),
+    "slidingbest": Method(smooth="best"),
+    "slidingFF": Method("FF"),
+    "slidingonlyinvalid": Method(only_invalid=True),
     "layers": Method(),
     "reference": Method(),
 }
@@ -79,6 +83,8 @@ def mesh_of(case: str) -> Mesh:
             return bent(valid) if case.endswith("reference") else tangle(valid, 25, 1 if "only" in case else 2)
     if case.startswith("small"):
         return tangle(Mesh.build(*generate.plate(0.18)))
+    if case.startswith("sliding"):
+        return tangle(sliding(Mesh.build(*generate.bracket(0.06, 10))), 25, 1)
     if case.endswith("FF"):
         return tangle(Mesh.build(*generate.bracket(0.18, 8)), 25, 2)
     if case == "layers":

@@ -35,7 +35,7 @@ def document_of(mesh: Mesh) -> Document:
     """A document that holds a mesh."""
     document = read(SAMPLES / ("plate.vtk" if mesh.dimension == 2 else "bracket.vtk"))
     return replace(
-        document, name="mesh", mesh=mesh, ids=FIRST + np.arange(mesh.topology.m), fixed={}, notes=(), basis=None,
+        document, name="mesh", mesh=mesh, ids=FIRST + np.arange(mesh.topology.m), holds={}, notes=(), basis=None,
         source=replace(document.source, points=mesh.points),
     )  # fmt: skip
 

@@ -16,6 +16,7 @@ constexpr int BEZIER_PARTS = 4096;  // of it that are looked at; what is not dec
 
 // Linear programme. All are relative to the largest number of their kind in the star.
 constexpr double LP_DROPPED_FACE2 = 1e-24;  // |n|^2 below which co-located neighbours leave the star
+constexpr double LP_PINNED2 = 1e-12;        // of |n|^2, below which a function does not depend on where a vertex slides
 constexpr double LP_RANK = 1e-9;            // residual below which the normals do not span R^d
 constexpr double LP_PRICING = 1e-13;        // reduced cost that still counts as negative
 constexpr double LP_PIVOT = 1e-11;          // pivot element that still counts as positive
@@ -48,7 +49,7 @@ constexpr int GUARD_TRIALS = 4;
 // Of the way back: smaller shares are not worth a step, and would have no end.
 constexpr double LEAST_SHARE = 0.01;
 
-// Shape of all elements at once: what a mean ratio of one and a degree are worth, and the gain an element, in the mean,
+// Shape of all elements at once: what a mean ratio of one and, by default, a degree are worth, and the gain an element, in the mean,
 // below which an iteration is the last; the floor counts so many times the goal.
 constexpr double SHAPE_RATIO = 100.0, SHAPE_ANGLE = 0.3, SHAPE_GAIN = 1e-3, SHAPE_FLOOR = 30.0;
 constexpr double SHAPE_SHARP_GAIN = 1e-5;  // where elements are judged by their worst corners: many small steps pay

@@ -290,9 +290,41 @@ auto moved_py(const Matrix<const double>& before, const Matrix<const double>& af
     return to_numpy(std::move(moved));
 }
 
+template <class T>
+std::vector<T> copied(const Vector<const T>& values) {
+    return {values.data(), values.data() + values.size()};
+}
+
+void init_freedom(Freedom* self, const Vector<const std::int32_t>& frame, const Vector<const std::uint8_t>& directions,
+                  const Matrices<const double>& axes, const Vector<const std::int32_t>& offsets,
+                  const Vector<const std::int32_t>& neighbours) {
+    new (self) Freedom{copied(frame), copied(directions), {axes.data(), axes.data() + axes.size()}, copied(offsets),
+                       copied(neighbours)};
+}
+
+// Numbers things (n,) so that those which pairs (p, 2) join have one number, by the first of each.
+auto joined_py(const Matrix<const std::int32_t>& pairs, std::int32_t n) {
+    std::vector<std::int32_t> first(n);
+    std::iota(first.begin(), first.end(), 0);
+    const auto root = [&](std::int32_t i) {
+        while (first[i] != i) i = first[i] = first[first[i]];
+        return i;
+    };
+    for (std::size_t i = 0; i < pairs.shape(0); ++i) {
+        const std::int32_t a = root(pairs(i, 0)), b = root(pairs(i, 1));
+        first[std::max(a, b)] = std::min(a, b);
+    }
+    for (std::int32_t i = 0; i < n; ++i) first[i] = first[first[i]];
+    return to_numpy(std::move(first));
+}
+
 }  // namespace
 
 void bind_mesh(nb::module_& m) {
+    nb::class_<Freedom>(m, "Freedom")
+        .def("__init__", &init_freedom, "frame"_a.noconvert(), "directions"_a.noconvert(), "axes"_a.noconvert(),
+             "offsets"_a.noconvert(), "neighbours"_a.noconvert());
+    m.def("joined", &joined_py, "pairs"_a.noconvert(), "n"_a);
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);
     m.def("rows", &rows_py, "values"_a.noconvert(), "which"_a.noconvert());

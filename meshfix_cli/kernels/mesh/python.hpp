@@ -6,6 +6,7 @@
 
 #include "arrays.hpp"
 #include "mesh/edges.hpp"
+#include "mesh/freedom.hpp"
 #include "mesh/star.hpp"
 #include "mesh/stars.hpp"
 
@@ -25,6 +26,11 @@ inline EdgesView edges_view(const PyEdges& edges) { return {edges.first.data(), 
 inline const std::uint8_t* bytes_of(const Vector<const bool>& mask, std::int64_t expected) {
     if (static_cast<std::int64_t>(mask.shape(0)) != expected) throw nb::value_error("the mask is of another mesh");
     return reinterpret_cast<const std::uint8_t*>(mask.data());
+}
+
+inline void check_freedom(const Freedom* freedom, std::int64_t n) {
+    if (freedom != nullptr && static_cast<std::int64_t>(freedom->frame.size()) != n)
+        throw nb::value_error("the freedom is of another mesh");
 }
 
 template <class T>

@@ -7,6 +7,8 @@
 //                 block is filled up with its last face, which changes no minimum
 // position        the free vertex
 // radius          the distance of the farthest neighbour; 0: all neighbours are in one point
+// directions      in which the vertex may go
+// centre          where the mean of the neighbours draws it: the origin, or the place for it in the vertex's line or plane
 #pragma once
 
 #include <cmath>
@@ -14,6 +16,7 @@
 #include <vector>
 
 #include "mesh/elements.hpp"
+#include "mesh/freedom.hpp"
 #include "mesh/simplex.hpp"
 
 namespace meshfix {
@@ -32,15 +35,28 @@ struct StarsView {
     }
 };
 
-// Mean of the neighbours of v, summed as differences: at a far offset the sum itself would lose digits.
+// Mean of some vertices, summed as differences: at a far offset the sum itself would lose digits.
+template <int D>
+inline Vec<D> mean_of(const std::int32_t* vertices, std::int32_t count, const double* points) {
+    const Vec<D> first = load<D>(points + static_cast<std::int64_t>(vertices[0]) * D);
+    Vec<D> sum{};
+    for (std::int32_t i = 1; i < count; ++i)
+        sum = sum + (load<D>(points + static_cast<std::int64_t>(vertices[i]) * D) - first);
+    return first + (1.0 / count) * sum;
+}
+
+// Of the neighbours of v.
 template <int D>
 inline Vec<D> centroid(const StarsView& stars, const double* points, std::int64_t v) {
     const std::int32_t begin = stars.neighbour_offsets[v], end = stars.neighbour_offsets[v + 1];
-    const Vec<D> first = load<D>(points + static_cast<std::int64_t>(stars.neighbours[begin]) * D);
-    Vec<D> sum{};
-    for (std::int32_t i = begin + 1; i < end; ++i)
-        sum = sum + (load<D>(points + static_cast<std::int64_t>(stars.neighbours[i]) * D) - first);
-    return first + (1.0 / (end - begin)) * sum;
+    return mean_of<D>(stars.neighbours + begin, end - begin, points);
+}
+
+// Of those in the line or plane of v, there.
+template <int D>
+inline Vec<D> centroid(const Freedom& freedom, const Directions<D>& directions, const double* points, std::int64_t v) {
+    const std::int32_t begin = freedom.offsets[v], end = freedom.offsets[v + 1];
+    return directions.onto(mean_of<D>(freedom.neighbours.data() + begin, end - begin, points));
 }
 
 // LANES faces: coordinate c of vertex k is [k][c].
@@ -61,8 +77,20 @@ struct Star {
     std::vector<Roles<D>> roles;  // of the blocks; empty: all are simplices
     const std::uint16_t* faces = nullptr;
     int faces_count = 0;
-    Vec<D> origin{}, position{};
+    Vec<D> origin{}, position{}, centre{};
     double unit = 1.0, radius = 0.0;
+    Directions<D> directions{};
+
+    // `freedom`: null: v may go anywhere.
+    void gather(const StarsView& stars, const Freedom* freedom, const double* anchors, const double* points,
+                std::int64_t v) {
+        gather(stars, points, v);
+        directions.count = D;
+        centre = {};
+        if (freedom == nullptr || freedom->anywhere(v)) return;
+        directions.set(*freedom, v, load<D>(anchors + v * D));
+        centre = to_local(centroid<D>(*freedom, directions, points, v));
+    }
 
     void gather(const StarsView& stars, const double* points, std::int64_t v) {
         const std::int32_t begin = stars.neighbour_offsets[v], end = stars.neighbour_offsets[v + 1];
@@ -128,8 +156,11 @@ struct Star {
     Vec<D> to_global(const Vec<D>& x) const { return origin + unit * x; }
     Vec<D> to_local(const Vec<D>& p) const { return (1.0 / unit) * (p - origin); }
 
+    // Where in the global coordinates the vertex comes to be, if it goes to x.
+    Vec<D> landing(const Vec<D>& x) const { return directions.onto(to_global(x)); }
+
     // The nearest position that the global coordinates can hold: what is judged is what will be stored.
-    Vec<D> snap(const Vec<D>& x) const { return to_local(to_global(x)); }
+    Vec<D> snap(const Vec<D>& x) const { return to_local(landing(x)); }
 
     // Edges from x to the vertices of face i, and of all faces of a block.
     Edges<D> edges(int i, const Vec<D>& x) const {

@@ -39,7 +39,7 @@ struct ActiveSet {
                 if (f.value[lane] > value + ACTIVE) continue;
                 Vec<D> gradient;
                 for (int c = 0; c < D; ++c) gradient[c] = f.gradient[c][lane];
-                gradients.push_back(gradient);
+                gradients.push_back(star.directions.along(gradient));
             }
         }
         return min_norm_point<D>(gradients);

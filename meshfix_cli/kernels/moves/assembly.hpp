@@ -11,6 +11,7 @@
 
 #include "common/pack.hpp"
 #include "common/parallel.hpp"
+#include "mesh/freedom.hpp"
 #include "mesh/simplex.hpp"
 
 namespace meshfix {
@@ -22,6 +23,9 @@ class Assembly {
         : simplices_(simplices, simplices + m * (D + 1)) {
         number_shares(n);
     }
+
+    // The gradient by vertices that go along their axes is that part of it: steps along sums of gradients keep to these.
+    void constrain(const Freedom& freedom) { freedom_ = freedom; }
 
     const std::vector<std::int32_t>& simplices() const { return simplices_; }
     std::int64_t size() const { return static_cast<std::int64_t>(simplices_.size()) / (D + 1); }
@@ -38,6 +42,7 @@ class Assembly {
             for (std::int64_t v = begin; v < end; ++v) {
                 Vec<D> sum{};
                 for (std::int32_t i = offsets_[v]; i < offsets_[v + 1]; ++i) sum = sum + shares_[of_vertices_[i]];
+                if (!freedom_.frame.empty() && !freedom_.anywhere(v)) sum = along(v, sum);
                 for (int k = 0; k < D; ++k) gradient[v * D + k] = sum[k];
             }
         });
@@ -94,6 +99,13 @@ class Assembly {
         for (std::int32_t i = 0; i < count(); ++i) of_vertices_[next[vertices[i]]++] = i;
     }
 
+    Vec<D> along(std::int64_t v, const Vec<D>& slope) const {
+        Directions<D> directions;
+        directions.set(freedom_, v, Vec<D>{});
+        return directions.along(slope);
+    }
+
+    Freedom freedom_{};  // of the free vertices, or none
     std::vector<std::int32_t> simplices_;
     std::vector<std::int32_t> share_of_;               // (m, D+1): the share of each corner
     std::vector<std::int32_t> first_shares_;           // (items + 1)

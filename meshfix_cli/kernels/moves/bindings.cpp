@@ -32,16 +32,18 @@ auto mean_ratio_py(const Matrix<const double>& neighbours, const Matrix<const st
 
 auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8_t>& states, const PyConnectivity& self,
                  const Vector<const std::int32_t>& blocks, double threshold_sine2, double min_measure,
-                 const Matrix<const double>& start, double max_move, int threads) {
+                 const Matrix<const double>& start, double max_move, int threads, const Freedom* freedom) {
     const Connectivity& mesh = self.mesh;
     if (!self.has_stars) throw nb::value_error("the stars are not built");
     check_points(points, self);
     check_points(start, self);
     if (static_cast<std::int64_t>(states.shape(0)) != mesh.n()) throw nb::value_error("the states are of another mesh");
+    check_freedom(freedom, mesh.n());
     const Counts counts = with_dimension(points.shape(1), [&](auto d) {
         return relocate<d>(static_cast<Move>(move), stars_of(mesh), points.data(), states.data(), mesh.n(), blocks.data(),
                            static_cast<std::int64_t>(blocks.shape(0)),
-                           Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move}, threads);
+                           Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move, freedom},
+                           threads);
     });
     return std::make_pair(counts.visited, counts.moved);
 }
@@ -115,16 +117,24 @@ auto min_norm_point_py(const Matrix<const double>& vectors) {
     }));
 }
 
-// The points, the free ones at the mean of their neighbours, by weights where there are any.
+// The points, the free ones at the mean of their neighbours, by weights where there are any; with a `freedom` of those in
+// their line or plane.
 auto embedding_py(const Matrix<const double>& points, const PyConnectivity& self, const Vector<const bool>& free,
-                  const PyEdges& edges, const Vector<const double>& weights, int threads) {
+                  const PyEdges& edges, const Vector<const double>& weights, int threads,
+                  const Freedom* freedom) {
     if (!self.has_stars) throw nb::value_error("the stars are not built");
     check_points(points, self);
+    check_freedom(freedom, self.mesh.n());
     const std::uint8_t* mask = bytes_of(free, self.mesh.n());
     std::vector<double> embedded(points.data(), points.data() + points.size());
     with_dimension(points.shape(1), [&](auto d) {
-        const double* by = self.mesh.elements.empty() ? nullptr : weights.data();
-        Embedding<d>(stars_of(self.mesh), points.data(), mask, edges_view(edges), by, self.mesh.n(), threads)
+        const double* by = self.mesh.elements.empty() || freedom != nullptr ? nullptr : weights.data();
+        StarsView stars = stars_of(self.mesh);
+        if (freedom != nullptr) {
+            stars.neighbour_offsets = freedom->offsets.data();
+            stars.neighbours = freedom->neighbours.data();
+        }
+        Embedding<d>(stars, points.data(), mask, edges_view(edges), by, self.mesh.n(), threads)
             .move(embedded.data());
         return 0;
     });
@@ -158,6 +168,7 @@ struct ShapeArguments {
     const Vector<const std::int32_t>& owners;
     std::int64_t free;
     ShapeGoal goal;
+    const Freedom* freedom;
     int threads;
 
     template <int D>
@@ -165,16 +176,18 @@ struct ShapeArguments {
         return {points.data(), static_cast<std::int64_t>(points.shape(0)), free, simplices.data(),
                 static_cast<std::int64_t>(simplices.shape(0)),
                 {{corners.data(), corners.data() + corners.size()}, {owners.data(), owners.data() + owners.size()}}, goal,
-                threads};
+                freedom, threads};
     }
 };
 
 auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                      const Vector<const double>& corners, const Vector<const std::int32_t>& owners, std::int64_t free,
-                     double goal, double floor, double measure, double weight, double sharpness, int threads) {
+                     double goal, double floor, double measure, double weight, double sharpness, int threads,
+                     const Freedom* freedom, double angle) {
+    check_freedom(freedom, free);
     const std::size_t d = points.shape(1);
-    const ShapeGoal aims{goal, floor, measure, weight, sharpness};
-    const ShapeArguments arguments{points, simplices, corners, owners, free, aims, threads};
+    const ShapeGoal aims{goal, floor, measure, weight, sharpness, angle};
+    const ShapeArguments arguments{points, simplices, corners, owners, free, aims, freedom, threads};
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
     const double value = with_dimension(d, [&](auto dimension) {
         auto shape = arguments.make<dimension>();
@@ -187,10 +200,12 @@ auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std:
 // The free points where so many iterations end.
 auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                const Vector<const double>& corners, const Vector<const std::int32_t>& owners, std::int64_t free, double goal,
-               double floor, double measure, double weight, double sharpness, int iterations, int threads) {
+               double floor, double measure, double weight, double sharpness, int iterations, int threads,
+               const Freedom* freedom, double angle) {
+    check_freedom(freedom, free);
     const std::size_t d = points.shape(1);
-    const ShapeGoal aims{goal, floor, measure, weight, sharpness};
-    const ShapeArguments arguments{points, simplices, corners, owners, free, aims, threads};
+    const ShapeGoal aims{goal, floor, measure, weight, sharpness, angle};
+    const ShapeArguments arguments{points, simplices, corners, owners, free, aims, freedom, threads};
     return to_numpy(with_dimension(d, [&](auto dimension) {
         Lbfgs<Shape<dimension>> lbfgs(arguments.make<dimension>(), free * dimension, threads);
         lbfgs.start();
@@ -215,12 +230,13 @@ struct PyFoldover {
 template <class Targets>
 void init_foldover(PyFoldover* self, const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                    const Targets& targets, const Matrix<const double>& centres, double radius, bool drawn,
-                   int threads) {
+                   int threads, const Freedom* freedom) {
+    check_freedom(freedom, static_cast<std::int64_t>(centres.shape(0)));
     new (self) PyFoldover(with_dimension(points.shape(1), [&](auto dimension) {
         constexpr int D = dimension;
         const FoldoverRegion<D> region{points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
                                        targets.data(), static_cast<std::int64_t>(simplices.shape(0)), centres.data(),
-                                       static_cast<std::int64_t>(centres.shape(0)), radius, drawn};
+                                       static_cast<std::int64_t>(centres.shape(0)), radius, drawn, freedom};
         PyFoldover::Minimiser<D, Targets> lbfgs({region, threads}, region.free * D, threads);
         lbfgs.start();
         return PyFoldover{std::move(lbfgs)};
@@ -258,7 +274,8 @@ void bind_foldover(nb::module_& m, nb::class_<PyFoldover>& foldover) {
     m.def("foldover_energy", &foldover_energy_py<Targets>, "simplices"_a.noconvert(), "points"_a.noconvert(),
           "targets"_a.noconvert(), "eps"_a, "weight"_a, "free"_a, "threads"_a);
     foldover.def("__init__", &init_foldover<Targets>, "points"_a.noconvert(), "simplices"_a.noconvert(),
-                 "targets"_a.noconvert(), "centres"_a.noconvert(), "radius"_a, "drawn"_a, "threads"_a);
+                 "targets"_a.noconvert(), "centres"_a.noconvert(), "radius"_a, "drawn"_a, "threads"_a,
+          "freedom"_a = nb::none());
 }
 
 }  // namespace
@@ -266,7 +283,8 @@ void bind_foldover(nb::module_& m, nb::class_<PyFoldover>& foldover) {
 void bind_moves(nb::module_& m) {
     m.def("relocate", &relocate_py, "move"_a, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a,
           "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
-          "threads"_a);
+          "threads"_a,
+          "freedom"_a = nb::none());
     m.def("receive", &receive_py, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a, "vertices"_a.noconvert(),
           "positions"_a.noconvert());
     m.def("exclusive", &exclusive_py, "points"_a.noconvert(), "mesh"_a, "movable"_a.noconvert(), "vertices"_a.noconvert(),
@@ -274,15 +292,18 @@ void bind_moves(nb::module_& m) {
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
-          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "threads"_a);
+          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "threads"_a,
+          "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
           "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "iterations"_a,
-          "threads"_a);
+          "threads"_a,
+          "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DUE") = DUE;
 
     m.def("embedding", &embedding_py, "points"_a.noconvert(), "mesh"_a, "free"_a.noconvert(), "edges"_a,
-          "weights"_a.noconvert(), "threads"_a);
+          "weights"_a.noconvert(), "threads"_a,
+          "freedom"_a = nb::none());
     nb::class_<PyFoldover> foldover(m, "Foldover");
     bind_foldover<Sizes>(m, foldover);
     bind_foldover<Inverses>(m, foldover);

@@ -42,6 +42,7 @@ class Foldover {
     Foldover(const std::int32_t* simplices, std::int64_t m, std::int64_t n)
         : assembly_(simplices, m, n), parts_(assembly_.items()) {}
 
+    void constrain(const Freedom& freedom) { assembly_.constrain(freedom); }
     const std::vector<std::int32_t>& simplices() const { return assembly_.simplices(); }
     std::int64_t size() const { return assembly_.size(); }
 

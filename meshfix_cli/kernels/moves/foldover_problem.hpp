@@ -20,6 +20,7 @@ namespace meshfix {
 
 // What a region is given as, in model units: points (n, D), the `free` ones first; simplices (m, D+1) and the numbers of
 // their targets; a ball for each free vertex; an infinite radius: none. Where vertices are `drawn`, they may be outside.
+// `freedom`: where the free ones may go, from where they are; null: anywhere.
 template <int D>
 struct FoldoverRegion {
     const double* points;
@@ -31,6 +32,7 @@ struct FoldoverRegion {
     std::int64_t free;
     double radius;
     bool drawn;
+    const Freedom* freedom;
 };
 
 template <int D, class Target>
@@ -56,6 +58,7 @@ class FoldoverProblem {
         for (std::int64_t s = 0; s < region.m; ++s) unit_ += Target::size(target(s)) / static_cast<double>(region.m);
         for (std::int64_t s = 0; s < region.m; ++s) Target::divide(target(s), unit_);
         if constexpr (Target::SCALED) find_scales();
+        if (region.freedom != nullptr) energy_.constrain(*region.freedom);
         for (std::int64_t i = 0; i < region.n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(region.n);
         for (std::int64_t v = 0; v < region.n; ++v) save(to_local(load<D>(points_.data() + v * D)), local_.data(), v);
         radius_ = reach_ / unit_;

@@ -9,11 +9,10 @@ namespace meshfix {
 // out: min_sine2 at the position.
 template <int D>
 Vec<D> smart_laplacian(const Star<D>& star, double& quality) {
-    const Vec<D> centre{};  // the origin of the local frame, which the global coordinates hold exactly
-    const double moved = min_sine2<D>(star, centre, quality);
+    const double moved = min_sine2<D>(star, star.centre, quality);  // the global coordinates hold it exactly
     if (!(moved > quality)) return star.position;
     quality = moved;
-    return centre;
+    return star.centre;
 }
 
 }  // namespace meshfix

@@ -51,7 +51,7 @@ struct LinearProgram {
 
     // Takes the columns from a star; `heights`: divided by |n_i|.
     void set(const Star<D>& star, bool heights) {
-        resize(star, star.faces_count);
+        resize(star.neighbours, star.radius, star.faces_count);
         for (std::size_t b = 0; b < star.blocks.size(); ++b) {
             const auto& p = star.blocks[b];
             costs[b] = determinant(p);
@@ -64,10 +64,10 @@ struct LinearProgram {
         settle(heights);
     }
 
-    // Takes other affine functions of the position, `count` values at the origin and their gradients.
-    void set(const Star<D>& star, const std::vector<Affine<D>>& functions, bool heights) {
+    // Takes other affine functions of the position, values at the origin and their gradients; the neighbours set axes.
+    void set(const std::vector<Vec<D>>& neighbours, double radius, const std::vector<Affine<D>>& functions, bool heights) {
         const int count = static_cast<int>(functions.size());
-        resize(star, count);
+        resize(neighbours, radius, count);
         for (int i = 0; i < faces_count; ++i) {
             const Affine<D>& f = functions[std::min(i, count - 1)];
             costs[i / LANES][i % LANES] = f.value;
@@ -114,14 +114,14 @@ struct LinearProgram {
     double weight(int row) const { return inverse[row][D]; }
 
    private:
-    void resize(const Star<D>& star, int count) {
+    void resize(const std::vector<Vec<D>>& neighbours, double radius, int count) {
         faces = count;
         const int blocks = (count + LANES - 1) / LANES;
         faces_count = blocks * LANES;
         normals.resize(blocks);
         costs.resize(blocks);
-        box = LP_BOX * star.radius;
-        set_frame(star.neighbours);
+        box = LP_BOX * radius;
+        set_frame(neighbours);
     }
 
     void settle(bool heights) {
@@ -149,7 +149,7 @@ struct LinearProgram {
         frame[0] = first_far(neighbours, Vec<D>{});
         if constexpr (D == 2) {
             frame[1] = {-frame[0][1], frame[0][0]};
-        } else {
+        } else if constexpr (D == 3) {
             frame[1] = first_far(neighbours, frame[0]);
             frame[2] = cross(frame[0], frame[1]);
         }

@@ -52,6 +52,30 @@ struct StarSum {
     }
 };
 
+// The step of a vertex, in the directions that it has.
+template <int D, int K>
+Vec<D> step_along(const StarSum<D>& sum, const Directions<D>& directions, double radius) {
+    StarSum<K> part;
+    for (int i = 0; i < K; ++i) {
+        part.gradient[i] = dot(directions.axes[i], sum.gradient);
+        for (int j = 0; j <= i; ++j)
+            for (int k = 0; k < D; ++k)
+                for (int l = 0; l < D; ++l)
+                    part.hessian[i][j] += directions.axes[i][k] * sum.hessian[std::max(k, l)][std::min(k, l)] * directions.axes[j][l];
+    }
+    const Vec<K> step = part.step(radius);
+    Vec<D> way{};
+    for (int i = 0; i < K; ++i) way = way + step[i] * directions.axes[i];
+    return way;
+}
+
+template <int D>
+Vec<D> newton_step(const StarSum<D>& sum, const Star<D>& star) {
+    if (star.directions.anywhere()) return sum.step(star.radius);
+    if (D == 3 && star.directions.count == 2) return step_along<D, 2>(sum, star.directions, star.radius);
+    return step_along<D, 1>(sum, star.directions, star.radius);
+}
+
 template <int D>
 struct MeanRatio : StarSum<D> {
     // The sum over a star at x; infinite where a determinant is not positive.
@@ -174,7 +198,7 @@ template <int D, class Sum, class F>
 Vec<D> improve_mean(const Star<D>& star, double quality, double floor, const F& reachable) {
     const Sum here(star, star.position);
     const double least = std::min(quality, floor) * (1.0 - SAME_SINE2);  // `min_sine2` wants more than its floor
-    Vec<D> step = here.step(star.radius);
+    Vec<D> step = newton_step<D>(here, star);
     for (int trial = 0; trial < NEWTON_TRIALS; ++trial, step = 0.5 * step) {
         const Vec<D> x = reachable(star.position + step);
         if (Sum::at(star, x) < here.value && min_sine2<D>(star, x, least) > 0.0) return x;

@@ -8,8 +8,8 @@
 #include "moves/active_set.hpp"
 #include "moves/come_back.hpp"
 #include "moves/laplacian.hpp"
-#include "moves/linear_program.hpp"
 #include "moves/mean_ratio.hpp"
+#include "moves/programme.hpp"
 
 namespace meshfix {
 
@@ -23,6 +23,7 @@ struct Parameters {
     double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
     const double* start;     // (n, D): where the vertices came from
     double max_move;         // how far from there they may be; infinity: anywhere
+    const Freedom* freedom = nullptr;  // where they may go; null: anywhere
 };
 
 // What a sweep knows of each vertex. One is due until it has been visited, and again when it or a neighbour moves:
@@ -49,7 +50,7 @@ struct Relocation {
     Parameters parameters;
 
     Star<D> star{};
-    LinearProgram<D> program{};
+    Programme<D> program{};
     ActiveSet<D> active_set{};
     std::vector<Affine<D>> functions{};
 
@@ -105,9 +106,8 @@ struct Relocation {
             functions.clear();
             for_each_affine(v, [&](double value, const Vec<D>& gradient) { functions.push_back({value, gradient}); });
             for (const bool heights : {true, false}) {
-                program.set(star, functions, heights);
-                const bool solved = program.solve() == LpStatus::optimal;
-                if (solved && (program.pi[D] > 0.0 || !heights)) return store(v, star.to_global(program.position()));
+                const bool solved = program.solve(star, functions, heights);
+                if (solved && (program.smallest > 0.0 || !heights)) return store(v, star.landing(program.position));
             }
         }
         return false;
@@ -132,8 +132,16 @@ struct Relocation {
         return changed;
     }
 
+    Vec<D> mean_of_neighbours(std::int64_t v) {
+        star.directions.count = D;
+        if (parameters.freedom == nullptr || parameters.freedom->anywhere(v)) return centroid<D>(stars, points, v);
+        star.directions.set(*parameters.freedom, v, load<D>(parameters.start + v * D));
+        return centroid<D>(*parameters.freedom, star.directions, points, v);
+    }
+
     bool place(std::int64_t v, Vec<D> x) {
         if (parameters.max_move < INFINITY) x = within_reach(v, x);
+        x = star.directions.with_kept(x);
         bool changed = false;
         for (int k = 0; k < D; ++k) {
             changed |= points[v * D + k] != x[k];
@@ -166,22 +174,19 @@ struct Relocation {
     // To the optimum of the linear programme. Also where the smallest measure stays the same: of many optima the
     // move to another is what frees collapsed clusters in a later sweep.
     bool untangle(std::int64_t v) {
-        program.set(star, false);
-        if (program.solve() != LpStatus::optimal) return false;
-        return store(v, star.to_global(program.position()));
+        return program.solve(star, false) && store(v, star.landing(program.position));
     }
 
     // The largest smallest height where that makes the star valid, else the largest smallest measure: heights alone
     // diverge on hard tangles.
     bool untangle_heights(std::int64_t v) {
-        program.set(star, true);
-        if (program.solve() != LpStatus::optimal || !(program.pi[D] > 0.0)) return untangle(v);
-        return store(v, star.to_global(program.position()));
+        if (!program.solve(star, true) || !(program.smallest > 0.0)) return untangle(v);
+        return store(v, star.landing(program.position));
     }
 
     // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
     bool combined_untangle(std::int64_t v) {
-        const bool moved = store(v, star.origin);
+        const bool moved = store(v, star.directions.anywhere() ? star.origin : star.landing(star.centre));
         star.position = star.to_local(load<D>(points + v * D));
         return (star.valid(star.position) ? false : untangle(v)) || moved;
     }
@@ -205,7 +210,7 @@ struct Relocation {
         const double quality = min_sine2<D>(star, star.position, 0.0), floor = parameters.threshold_sine2;
         if (!(quality > 0.0)) return false;
         const auto reachable = [&](const Vec<D>& x) {
-            const Vec<D> there = star.to_global(x);
+            const Vec<D> there = star.landing(x);
             return star.to_local(parameters.max_move < INFINITY ? within_reach(v, there) : there);
         };
         return take(v, star.roles.empty() ? improve_mean<D, MeanRatio<D>>(star, quality, floor, reachable)
@@ -239,9 +244,8 @@ struct Relocation {
 
     // To the largest smallest height, where that raises the smallest sine.
     Vec<D> smart_programme(const Vec<D>& x, double& quality) {
-        program.set(star, true);
-        if (program.solve() != LpStatus::optimal) return x;
-        const Vec<D> trial = star.snap(program.position());
+        if (!program.solve(star, true)) return x;
+        const Vec<D> trial = star.snap(program.position);
         const double there = min_sine2<D>(star, trial, quality);
         if (!(there > quality)) return x;
         quality = there;
@@ -263,11 +267,11 @@ struct Relocation {
     void relocate(Move move, std::int64_t v, Counts& counts) {
         ++counts.visited;
         if (move == Move::laplacian) {  // nearly all move: all stay due
-            counts.moved += place(v, centroid<D>(stars, points, v));
+            counts.moved += place(v, mean_of_neighbours(v));
             return;
         }
         states[v] = DONE;
-        star.gather(stars, points, v);
+        star.gather(stars, parameters.freedom, parameters.start, points, v);
         switch (move) {
             case Move::untangle: counts.moved += untangle(v); break;
             case Move::combined_untangle: counts.moved += combined_untangle(v); break;

@@ -1,7 +1,7 @@
 // The shape of a valid mesh as one function of all its free vertices, and its gradient:
 //
 //     sum over simplices of
-//         - RATIO mean ratio - ANGLE t + weight (max(0, goal - t)^2 + FLOOR max(0, floor - t)^2)
+//         - RATIO mean ratio - angle t + weight (max(0, goal - t)^2 + FLOOR max(0, floor - t)^2)
 //         + MEASURE max(0, 1 + MARGIN - det / least)^2,
 //
 // t the smallest angle in degrees; the goal lifts the few that are worse than the others, the floor holds the worst, and
@@ -23,6 +23,7 @@ namespace meshfix {
 
 struct ShapeGoal {
     double degrees, floor, measure, weight, sharpness;
+    double angle;  // what a degree of a smallest angle is worth
 };
 
 // Of the simplices that are corners of elements: their weights of scaled Jacobians, 0 for others, and their elements,
@@ -61,11 +62,13 @@ inline void add_slopes_of_angle(const Edges<3>& e, std::size_t k, double factor,
 template <int D>
 class Shape {
    public:
-    // points (n, D), the `free` ones first; simplices (m, D+1), the first vertex of each that is a corner is there.
+    // points (n, D), the `free` ones first; simplices (m, D+1), the first vertex of each that is a corner is there;
+    // `freedom`: where the free ones may go, null: anywhere.
     Shape(const double* points, std::int64_t n, std::int64_t free, const std::int32_t* simplices, std::int64_t m,
-          ShapeCorners corners, ShapeGoal goal, int threads)
+          ShapeCorners corners, ShapeGoal goal, const Freedom* freedom, int threads)
         : assembly_(simplices, m, n), corners_(std::move(corners.weights)), parts_(assembly_.items()), free_(free),
           threads_(threads), goal_(goal), points_(points, points + n * D) {
+        if (freedom != nullptr) assembly_.constrain(*freedom);
         if (goal_.sharpness > 0.0 && !corners_.empty()) find_elements(corners.owners);
         for (std::int64_t i = 0; i < n * D; ++i) origin_[i % D] += points_[i] / static_cast<double>(n);
         double size2 = 0.0;
@@ -240,10 +243,10 @@ class Shape {
         const double below = SHAPE_FLOOR * larger(0.0, goal_.floor - angle);
         const Edges<D> e = lane(edges, i);
         Corners<D> mine{};
-        add_slopes_of_angle(e, k, -DEGREE * (SHAPE_ANGLE + 2.0 * goal_.weight * (missing + below)), mine);
+        add_slopes_of_angle(e, k, -DEGREE * (goal_.angle + 2.0 * goal_.weight * (missing + below)), mine);
         for (int corner = 0; corner <= D; ++corner)
             for (int x = 0; x < D; ++x) slopes[corner][x][i] += mine[corner][x];
-        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) - SHAPE_ANGLE * angle;
+        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) - goal_.angle * angle;
     }
 
     static constexpr double DEGREE = 57.29577951308232;

@@ -29,6 +29,7 @@ from meshfix_cli.report.facts import (
     processes,
     quality_rows,
     required,
+    sliding,
     title,
     verdict,
 )
@@ -120,7 +121,8 @@ def _scrolled(caption: str, content: str, style: str = "") -> str:
 
 def _verdict(report: Report) -> str:
     word = "Valid" if report.valid else "Not valid"
-    lines = [*verdict(replace(report, everything=False), listing=False), *(f"note: {note}" for note in report.notes)]
+    notes = (f"note: {note}" for note in (*report.notes, *sliding(report)))
+    lines = [*verdict(replace(report, everything=False), listing=False), *notes]
     lines = [line.removeprefix("valid: ").removeprefix("NOT VALID: ") for line in lines]
     return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{_shown(line)}</p>" for line in lines)
 

@@ -1,0 +1,153 @@
+"""What of a file keeps the shape of its boundary, and which vertices may slide without changing that."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.elements import ELEMENTS, dimension_of
+from meshfix_cli.mesh.freedom import constraints_of, freedom_of
+from meshfix_cli.meshfile.coincident import first_of_each_place
+from meshfix_cli.meshfile.document import BETWEEN, ON_BOUNDARY, ON_CELLS, Document
+
+Int64 = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+
+def slid(document: Document, interfaces: bool = True, reference: NDArray[np.float64] | None = None) -> Document:
+    """Return a document of which the flat boundary may slide.
+
+    Parameters
+    ----------
+    document : Document
+    interfaces : bool
+        Whether interfaces between regions may as well.
+    reference : (k, d) float64, optional
+        Where the vertices, in the order of the connectivity, were before the boundary moved: it tells planes and edges.
+    """
+    mesh, topology = document.mesh, document.mesh.topology
+    points = mesh.along_curve(mesh.points) if reference is None else reference
+    code = _joint(topology.m, *document.regions)
+    constraints = constraints_of(topology, points, code)
+    cells = _Cells(document, constraints.facets)
+    labels = _joint(len(constraints.facets), constraints.labels, cells.labels)
+    freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines))
+    held = cells.held | _twins(document)
+    for reason, mask in document.holds.items():
+        if reason not in (ON_BOUNDARY, ON_CELLS) and not (interfaces and reason.startswith(BETWEEN)):
+            held |= mask
+    return replace(document, mesh=mesh.sliding(freedom, held))
+
+
+def _joint(count: int, *values: NDArray[np.integer]) -> Int64:
+    """Return one number for each that some arrays (count,) have together; 0 where there are none."""
+    code = np.zeros(count, dtype=np.int64)
+    for one in values:
+        _, place = np.unique(one, return_inverse=True)
+        _, code = np.unique(code * (int(place.max(initial=0)) + 1) + place.reshape(-1), return_inverse=True)
+        code = code.reshape(-1)
+    return code
+
+
+def _twins(document: Document) -> Mask:
+    """Mark the points (n,) of the boundary that lie at one place with others: what touches there may be in contact."""
+    first = first_of_each_place(document.mesh.points, np.flatnonzero(document.mesh.topology.boundary))
+    copies = first != np.arange(len(first))
+    copies[first[copies]] = True
+    return copies
+
+
+class _Cells:
+    """The cells of the file that are not solved for, as they keep the shape of the mesh.
+
+    Attributes
+    ----------
+    labels : (f,) int64
+        For each facet a number for the tags and sets of the cell that lies on it; 0: there is none.
+    lines : (l, 2) int32
+        Those in space, in the numbers of the connectivity.
+    held : (n,) bool
+        Points of all cells that are neither facets nor lines.
+    """
+
+    def __init__(self, document: Document, facets: NDArray[np.int32]) -> None:
+        mesh, topology = document.mesh, document.mesh.topology
+        solved = {part.run for part in document.solved.parts}
+        runs = [i for i, run in enumerate(document.source.cells) if i not in solved and len(run.vertices)]
+        flat = [i for i in runs if _is_linear(document, i, mesh.dimension - 1)]
+        lines = [i for i in runs if mesh.dimension == 3 and _is_linear(document, i, 1)]
+        self.held = np.zeros(topology.n, dtype=bool)
+        for run in (document.source.cells[i] for i in runs if i not in (*flat, *lines)):
+            self._hold(np.concatenate([np.ravel(row) for row in run.vertices]).astype(np.int64))
+        self.lines = np.empty((0, 2), dtype=np.int32)
+        for i in lines:
+            self.lines = np.concatenate([self.lines, self._in_mesh(document, i)])
+        self.labels = np.zeros(len(facets), dtype=np.int64)
+        if flat:
+            self._find(document, facets, flat)
+
+    def _hold(self, vertices: Int64) -> None:
+        self.held[vertices[(vertices >= 0) & (vertices < len(self.held))]] = True
+
+    def _in_mesh(self, document: Document, run: int) -> NDArray[np.int32]:
+        """Return the cells (c, w) of a run in the numbers of the connectivity; those with other points are held."""
+        topology, vertices = document.mesh.topology, np.asarray(document.source.cells[run].vertices)
+        inside = (vertices >= 0) & (vertices < topology.n)
+        used = np.asarray((topology.used[np.where(inside, vertices, 0)] & inside).all(axis=1))
+        self._hold(vertices[~used].ravel())
+        return topology.number[vertices[used]]
+
+    def _find(self, document: Document, facets: NDArray[np.int32], runs: list[int]) -> None:
+        """Give facets the labels of the cells that lie on them; the points of other cells are held."""
+        rows, labels = [_ascending(facets)], [np.zeros(len(facets), dtype=np.int64)]
+        tags = _tags(document, runs)
+        for i, tag in zip(runs, tags, strict=True):
+            cells = self._in_mesh(document, i)
+            whole = len(cells) == len(tag)  # else which of them are left is not known
+            rows.append(_ascending(cells))
+            labels.append(tag + 1 if whole else np.ones(len(cells), dtype=np.int64))
+        every, label = np.concatenate(rows), np.concatenate(labels)
+        order = np.lexsort((label == 0, *every.T))  # facets behind the cells that lie on them
+        same = (every[order[1:]] == every[order[:-1]]).all(axis=1)
+        place = np.cumsum(np.concatenate([[True], ~same])) - 1
+        found = np.zeros(int(place.max()) + 1, dtype=np.int64)
+        np.maximum.at(found, place, label[order])
+        is_facet = np.zeros(len(found), dtype=bool)
+        is_facet[place[order < len(facets)]] = True
+        mine = order < len(facets)
+        self.labels[order[mine]] = found[place[mine]]
+        lost = every[order[~mine & ~is_facet[place]]]
+        self._hold(document.mesh.topology.connectivity.vertices[lost[lost >= 0]].astype(np.int64))
+
+
+def _is_linear(document: Document, run: int, dimension: int) -> bool:
+    cells = document.source.cells[run]
+    element = ELEMENTS.get(cells.type)
+    return element is not None and element.linear and dimension_of(cells.type) == dimension
+
+
+def _ascending(rows: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Return rows of vertices, at most four, each ascending, filled up with -1 at the front."""
+    filled = np.full((len(rows), 4), -1, dtype=np.int32)
+    filled[:, : rows.shape[1]] = rows
+    filled.sort(axis=1)
+    return filled
+
+
+def _tags(document: Document, runs: list[int]) -> list[Int64]:
+    """Return a number for each cell of some runs that stands for its regions and sets."""
+    source = document.source
+    ends = np.cumsum([len(source.cells[i].vertices) for i in runs])
+    columns: list[NDArray[np.integer]] = []
+    for key in source.regions:
+        values = np.concatenate([np.asarray(source.arrays.cell[key][i]) for i in runs])
+        if values.ndim == 1:
+            columns.append(np.unique(values, return_inverse=True)[1].reshape(-1))
+    for rows_of_runs in source.arrays.cell_sets.values():
+        member = np.zeros(ends[-1], dtype=np.int64)
+        for begin, i in zip((0, *ends[:-1]), runs, strict=True):
+            member[begin + np.asarray(rows_of_runs[i], dtype=np.int64)] = 1
+        columns.append(member)
+    return np.split(_joint(int(ends[-1]), *columns), ends[:-1])

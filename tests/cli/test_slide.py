@@ -1,0 +1,100 @@
+"""`--slide` and `perturb --boundary` at the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+from commands import run
+from geometries import grid
+from numpy.typing import NDArray
+from places import SAMPLES
+
+from meshfix_cli.meshfile.reading import read
+
+
+def box(path: Path, *, line: bool = False, regions: bool = False, hold: bool = False) -> Path:
+    """A cube of tetrahedra in a file, maybe with a line in one of its faces, two materials, or a face to be held."""
+    points, tets = grid(*[np.linspace(0, 1, 6)] * 3)
+    cells: list[tuple[str, object]] = [("tetra", tets)]
+    if line:
+        across = np.flatnonzero((points[:, 2] == 0) & (np.abs(points[:, 1] - 0.4) < 1e-9))
+        cells.append(("line", np.stack([across[:-1], across[1:]], axis=1)))
+    material = {"material": [(points[tets].mean(axis=1)[:, 0] > 0.6).astype(np.int32)]}
+    held = {"hold": (points[:, 2] == 0).astype(np.int32)}
+    meshio.Mesh(points, cells, held if hold else None, material if regions else None).write(path, binary=False)
+    return path
+
+
+def points_of(path: Path) -> NDArray[np.float64]:
+    return np.asarray(read(str(path)).source.points, dtype=np.float64)
+
+
+def tangled(path: Path, **options: bool) -> tuple[Path, Path, Path]:
+    """A box, the same tangled in its planes and edges, and the name of a third file."""
+    clean = box(path / "box.vtk", **options)
+    run("perturb", "--percent", "40", "--dist", "1h", "--boundary", clean, path / "bad.vtk")
+    return clean, path / "bad.vtk", path / "good.vtk"
+
+
+def test_a_boundary_tangled_in_its_planes_comes_back(tmp_path: Path) -> None:
+    clean, bad, good = tangled(tmp_path)
+    run("untangle", bad, good, code=3)
+    report = json.loads(run("untangle", "--slide", "flat", "--reference", clean, "--json", bad, good).stdout)
+    assert report["sliding"] == {"lines": 48, "planes": 96}
+    before, after = points_of(clean), points_of(good)
+    flat = np.isin(before, (0.0, 1.0))
+    assert np.array_equal(after[flat], before[flat])
+    assert np.abs(after - before).max() < 1e-3  # the elements have their shapes back
+    run("quality", good)
+
+
+def test_lines_in_a_face_end_patches_and_their_vertices_slide_along_them(tmp_path: Path) -> None:
+    clean, bad, good = tangled(tmp_path, line=True)
+    before, between, after = points_of(clean), points_of(bad), None
+    across = (before[:, 2] == 0) & (np.abs(before[:, 1] - 0.4) < 1e-9)
+    assert np.array_equal(between[across][:, 1:], before[across][:, 1:])
+    assert (between[across, 0] != before[across, 0]).any()
+    run("untangle", "--slide", "flat", "--reference", clean, bad, good)
+    after = points_of(good)
+    assert np.array_equal(after[across][:, 1:], before[across][:, 1:])
+    assert (np.diff(after[across, 0]) > 0).all()
+
+
+@pytest.mark.parametrize("slides", [True, False])
+def test_interfaces_slide_unless_they_are_told_not_to(tmp_path: Path, slides: bool) -> None:
+    clean, bad, good = tangled(tmp_path, regions=True)
+    option = "--slide-interfaces" if slides else "--no-slide-interfaces"
+    run("untangle", "--slide", "flat", option, "--reference", clean, bad, good, code=0 if slides else 3)
+    before, between, after = points_of(clean), points_of(bad), points_of(good)
+    interface = np.abs(before[:, 0] - 0.6) < 1e-9
+    assert np.array_equal(after[interface, 0], before[interface, 0])
+    assert (after[interface] != between[interface]).any() == slides
+
+
+def test_what_fix_holds_does_not_slide(tmp_path: Path) -> None:
+    clean, bad, good = tangled(tmp_path, hold=True)
+    run("untangle", "--slide", "flat", "--fix", "hold", "--reference", clean, bad, good, code=3)
+    before, between, after = points_of(clean), points_of(bad), points_of(good)
+    low, high = before[:, 2] == 0, before[:, 2] == 1
+    assert np.array_equal(after[low], between[low])
+    assert (after[high] != between[high]).any()
+
+
+def test_the_report_tells_what_sliding_would_gain(tmp_path: Path) -> None:
+    said = " ".join(run("quality", SAMPLES / "bracket.vtk").stdout.decode().split())
+    assert "note: with --slide flat 1,263 instead of 861 vertices could move, and the ceiling would be 22.214°" in said
+    done = run("untangle", "--slide", "flat", SAMPLES / "bracket_tangled.vtk", tmp_path / "out.vtk")
+    said = " ".join(done.stdout.decode().split())
+    assert "with --slide" not in said
+    assert "1,263 free (38 along lines, 364 in planes)" in said
+
+
+def test_a_batch_slides(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    run("batch", "--slide", "flat", "--smooth", "best", SAMPLES / "bracket_tangled.vtk", "--output-dir", out)
+    report = json.loads(run("quality", "--json", out / "bracket_tangled.vtk").stdout)
+    assert report["min_angle"] > 20  # held, 17.3 is the ceiling

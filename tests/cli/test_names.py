@@ -83,12 +83,15 @@ def test_files_that_are_written_beside_a_mesh(
     for name, value in environment.items():
         monkeypatch.setenv(name, value)
     beside = {"--history": ".csv", "--cells": ".vtu", "--report": ".html"}
-    for option, extension in [*beside.items(), *(("--plot", one) for one in (".png", ".svg", ".pdf"))]:
-        target = hostile.parent / f"beside{NAME}{extension}"
-        facts = run("untangle", "--json", option, target, hostile, hostile.parent / f"o{NAME}.vtk").stdout
-        assert json.loads(facts)["valid"]
-        assert target.stat().st_size > 100
-    page = (hostile.parent / f"beside{NAME}.html").read_text(encoding="utf-8")
+    for plot in (".png", ".svg", ".pdf"):
+        targets = {option: hostile.parent / f"beside{NAME}{extension}" for option, extension in beside.items()}
+        targets["--plot"] = hostile.parent / f"beside{NAME}{plot}"
+        words = [word for pair in targets.items() for word in pair]
+        assert json.loads(run("untangle", "--json", *words, hostile, hostile.parent / f"o{NAME}.vtk").stdout)["valid"]
+        for target in targets.values():
+            assert target.stat().st_size > 100
+            target.rename(hostile.parent / f"kept{target.suffix}")
+    page = (hostile.parent / "kept.html").read_text(encoding="utf-8")
     assert not ACTING.search(page)
     assert r"a\xff\x1b[31m\n" in page
     assert printed(run("quality", hostile, code=3))

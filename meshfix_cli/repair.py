@@ -243,17 +243,19 @@ class Judge:
         self.check(document)
         shown = list(stages)[-1:] if self.brief else list(stages)  # nobody sees the others
         most = None if self.brief else ceiling(result, self.threads)
-        if not (self.brief or command == "perturb"):
-            more["facts"] = {**(more.get("facts") or {}), **self._sliding(document, result, most)}
         asked = (one.name for one in self.requirements if one.is_metric)
         metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
+        summaries = {stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown}
+        if not (self.brief or command == "perturb"):
+            valid = summaries[shown[-1]].inverted == 0
+            more["facts"] = {**(more.get("facts") or {}), **self._sliding(document, result, most, valid)}
         return Report(
             name=document.name,
             command=command,
             meshes=dict(stages),
             points=partial(document.file_points, result),
             ids=document.ids,
-            stages={stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown},
+            stages=summaries,
             ceiling=most,
             obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
             fixed=document.fixed,
@@ -263,8 +265,7 @@ class Judge:
             **more,
         )
 
-
-    def _sliding(self, document: Document, result: Mesh, most: float | None) -> dict[str, Any]:
+    def _sliding(self, document: Document, result: Mesh, most: float | None, valid: bool) -> dict[str, Any]:
         """Return how many vertices slide or, where none may, what might be gained: a ceiling above this one."""
         from meshfix_cli.meshfile.sliding import slid
         from meshfix_cli.quality.summary import ceiling
@@ -274,7 +275,7 @@ class Judge:
             return {"sliding": {"lines": int((moving == 1).sum()), "planes": int((moving == 2).sum())}}
         if most is None:
             return {}
-        sliding = slid(document).mesh.with_points(result.points)
+        sliding = slid(replace(document, mesh=result), tangled=not valid).mesh
         after = ceiling(sliding, self.threads)
         if after is not None and not after > most:
             return {}

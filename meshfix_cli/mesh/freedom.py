@@ -81,7 +81,9 @@ class Freedom:
         return result
 
 
-def constraints_of(topology: Topology, points: Array, regions: NDArray[np.integer] | None = None) -> Constraints:
+def constraints_of(
+    topology: Topology, points: Array, regions: NDArray[np.integer] | None = None, tangled: bool = True
+) -> Constraints:
     """Return what of a mesh must keep its shape: the boundary and, between regions, interfaces.
 
     Parameters
@@ -90,16 +92,20 @@ def constraints_of(topology: Topology, points: Array, regions: NDArray[np.intege
     points : (k, d) float64
         In the order of the connectivity.
     regions : (m,) int, not negative, optional
+    tangled : bool
+        Whether elements may be inverted, and the boundary with them.
     """
-    code = np.zeros(topology.m, dtype=np.int64) if regions is None else np.asarray(regions, dtype=np.int64)
-    facets, owners, across = topology.facets_between(code)
-    by_row = code[topology.connectivity.rows]
-    beyond = np.where(across < 0, 0, by_row[across] + 1)
-    judged, inverted = Judged(topology.connectivity), np.zeros(topology.m, dtype=bool)
-    inverted[judged.check(points, 1)[0]] = True
-    broken = np.zeros(len(points), dtype=bool)
-    broken[judged.vertices(inverted)] = True
-    labels = by_row[owners] * (int(code.max()) + 2) + beyond
+    facets, owners, across = topology.facets_between(regions)
+    labels = np.zeros(len(facets), dtype=np.int64)
+    if regions is not None:
+        code = np.asarray(regions, dtype=np.int64)[topology.connectivity.rows]
+        beyond = np.where(across < 0, 0, code[across] + 1)
+        labels = code[owners] * (int(code.max()) + 2) + beyond
+    inverted, broken = np.zeros(topology.m, dtype=bool), np.zeros(len(points), dtype=bool)
+    if tangled:
+        judged = Judged(topology.connectivity)
+        inverted[judged.check(points, 1)[0]] = True
+        broken[judged.vertices(inverted)] = True
     return Constraints(facets, labels, np.empty((0, 2), dtype=np.int32), inverted[owners], broken)
 
 

@@ -101,12 +101,16 @@ class MixedTopology(Topology):
         return self.of_vertices(mask[:-1])
 
     def facets_between(
-        self, regions: NDArray[np.integer]
+        self, regions: NDArray[np.integer] | None
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
         """Return the facets of the boundary and between regions, and their elements; see `Topology`."""
         mesh = self.connectivity
-        label, mates = np.asarray(regions)[mesh.rows][mesh.facet_owners], mesh.facet_mates
-        chosen = np.flatnonzero((mates < 0) | (label[mates] > label))
+        mates = mesh.facet_mates
+        is_chosen = mates < 0
+        if regions is not None:
+            label = np.asarray(regions)[mesh.rows][mesh.facet_owners]
+            is_chosen |= label[mates] > label
+        chosen = np.flatnonzero(is_chosen)
         width, beyond = 2 if self.dimension == 2 else WIDTH, mates[chosen]
         across = np.where(beyond < 0, -1, mesh.facet_owners[beyond]).astype(np.int32)
         return self.facets[chosen, :width], mesh.facet_owners[chosen], across

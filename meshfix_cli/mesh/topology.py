@@ -240,16 +240,19 @@ class Topology:
         return result
 
     def facets_between(
-        self, regions: NDArray[np.integer]
+        self, regions: NDArray[np.integer] | None
     ) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-        """Return the facets (f, w) of the boundary and between regions (m,), each once.
+        """Return the facets (f, w) of the boundary and, if there are any, between regions (m,), each once.
 
         With the element (f,) that each is of, and the one across, -1: none. All in the numbers of the connectivity,
         from outside of that element, which has the lower region; -1: no more vertices.
         """
         mesh, corners = self.connectivity, self.dimension + 1
-        label = np.asarray(regions)[mesh.rows]
-        row, position = np.nonzero((mesh.mates < 0) | (label[mesh.mates // corners] > label[:, None]))
+        chosen = mesh.mates < 0
+        if regions is not None:
+            label = np.asarray(regions)[mesh.rows]
+            chosen |= label[mesh.mates // corners] > label[:, None]
+        row, position = np.divmod(np.flatnonzero(chosen), corners)
         across = mesh.mates[row, position] // corners
         return mesh.simplices[row[:, None], _OPPOSITE[self.dimension][position]], row.astype(np.int32), across
 

@@ -16,7 +16,12 @@ Int64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
-def slid(document: Document, interfaces: bool = True, reference: NDArray[np.float64] | None = None) -> Document:
+def slid(
+    document: Document,
+    interfaces: bool = True,
+    reference: NDArray[np.float64] | None = None,
+    tangled: bool = True,
+) -> Document:
     """Return a document of which the flat boundary may slide.
 
     Parameters
@@ -26,13 +31,15 @@ def slid(document: Document, interfaces: bool = True, reference: NDArray[np.floa
         Whether interfaces between regions may as well.
     reference : (k, d) float64, optional
         Where the vertices, in the order of the connectivity, were before the boundary moved: it tells planes and edges.
+    tangled : bool
+        Whether the boundary may be tangled; see `constraints_of`.
     """
     mesh, topology = document.mesh, document.mesh.topology
     points = mesh.along_curve(mesh.points) if reference is None else reference
-    code = _joint(topology.m, *document.regions)
-    constraints = constraints_of(topology, points, code)
+    code = _joint(topology.m, *document.regions) if document.regions else None
+    constraints = constraints_of(topology, points, code, tangled)
     cells = _Cells(document, constraints.facets)
-    labels = _joint(len(constraints.facets), constraints.labels, cells.labels)
+    labels = _joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
     freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines))
     held = cells.held | _twins(document)
     for reason, mask in document.holds.items():
@@ -64,6 +71,8 @@ class _Cells:
 
     Attributes
     ----------
+    facets : bool
+        Whether there are any of the first.
     labels : (f,) int64
         For each facet a number for the tags and sets of the cell that lies on it; 0: there is none.
     lines : (l, 2) int32
@@ -84,7 +93,7 @@ class _Cells:
         self.lines = np.empty((0, 2), dtype=np.int32)
         for i in lines:
             self.lines = np.concatenate([self.lines, self._in_mesh(document, i)])
-        self.labels = np.zeros(len(facets), dtype=np.int64)
+        self.facets, self.labels = bool(flat), np.zeros(len(facets), dtype=np.int64)
         if flat:
             self._find(document, facets, flat)
 

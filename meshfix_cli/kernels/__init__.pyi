@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
+Integers = Int32 | Int64
 Float64 = NDArray[np.float64]
 Uint8 = NDArray[np.uint8]
 
@@ -361,16 +362,20 @@ def mean_ratio(neighbours: Float64, faces: NDArray[np.uint16], x: Float64) -> tu
     """Sum of the powered inverse mean ratios of a star, the same without derivatives, gradient (d,), Hessian (d, d)."""
 
 def cells_of_faces(
-    offsets: Int64, vertices: Int64, owner: Int64, neighbour: Int64, cells: int, threads: int
-) -> tuple[Int64, Int64, Int8, Int64]:
-    """Cells that are given by their faces, whose vertices have offsets (f + 1,).
+    offsets: Integers, vertices: Integers, owner: Integers, neighbour: Integers, cells: int, threads: int
+) -> tuple[Integers, Integers, Int8, Integers]:
+    """Cells that are given by their faces, whose vertices have offsets (f + 1,); all integers are of one type.
 
     Where the faces of each cell begin (cells + 1,), and which they are; by its corners (cells,), 4, 5, 6 or 8, which
-    element it is, 0 if none; and its nodes (cells, 8) in the order of its type.
+    element it is, 0 if none; and its nodes (cells, 4 or 6 or 8) in the order of its type, with what room the largest
+    may need.
     """
 
-def find_words(data: bytes, at: int, count: int) -> Int64:
-    """Spans (count, 2) of the first words at or behind an offset; fewer where the data end."""
+def find_words(data: bytes, at: int, count: int, brackets: bool = False) -> Int64:
+    """Spans (count, 2) of the first words at or behind an offset; fewer where the data end.
+
+    With `brackets` round ones separate words, as blanks do.
+    """
 
 def line_words(data: bytes, offsets: Int64, count: int) -> Int64:
     """Spans (k * count, 2) of the first words behind each offset (k,), -1 for those that the line does not have."""
@@ -414,8 +419,17 @@ def use_threads(threads: int) -> None:
 def behind_words(data: bytes, at: int, count: int) -> int:
     """Return the offset behind the next words; -1: there are fewer."""
 
-def scan_integers(data: bytes, at: int, count: int) -> tuple[Int32 | Int64, int, int]:
-    """Values, in 32 bits where these do, the offset behind them, and the offset of what is not an integer or -1."""
+def scan_integers(data: bytes, at: int, count: int, brackets: bool = False) -> tuple[Int32 | Int64, int, int]:
+    """Values, in 32 bits where these do, the offset behind them, and the offset of what is not an integer or -1.
+
+    With `brackets` round ones separate words, as blanks do.
+    """
+
+def read_integer_lists(data: bytes, at: int, count: int) -> tuple[Integers, Integers, int, bool]:
+    """Lists as in `3(0 4 7)`: offsets (lists + 1,), values (k,), the offset behind the last, and whether all are there.
+
+    Both have 32 bits where these do.
+    """
 
 def integers(data: bytes, spans: Int64, slash: bool) -> tuple[Int64, int]:
     """Values of the words at spans (n, 2), up to a slash if it may be there, and the row of the first bad one or -1."""

@@ -16,6 +16,7 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 
 Int64 = NDArray[np.int64]
+Integers = NDArray[np.int32] | NDArray[np.int64]
 
 _ELEMENTS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron"}  # by their corners
 
@@ -25,17 +26,17 @@ class Faces(NamedTuple):
 
     Attributes
     ----------
-    offsets : (f+1,) int64
+    offsets : (f+1,) int32 or int64
         Face i has the vertices `vertices[offsets[i]:offsets[i + 1]]`.
-    vertices : (k,) int64
-    owner, neighbour : (f,) int64
-        The cells on both sides; -1: there is none, as may be for the neighbour.
+    vertices : (k,) int
+    owner, neighbour : (f,) int
+        The cells on both sides; -1: there is none, as may be for the neighbour. All are of one type.
     """
 
-    offsets: Int64
-    vertices: Int64
-    owner: Int64
-    neighbour: Int64
+    offsets: Integers
+    vertices: Integers
+    owner: Integers
+    neighbour: Integers
 
     @property
     def cells(self) -> int:
@@ -53,12 +54,13 @@ class Faces(NamedTuple):
         starts, faces, corners, nodes = kernels.cells_of_faces(*self, self.cells, threads)
         for count, key in _ELEMENTS.items():
             if len(rows := np.flatnonzero(corners == count)):
-                yield key, nodes[rows, :count], rows
+                whole = nodes.shape == (len(rows), count)
+                yield key, nodes if whole else nodes[rows, :count], rows
         if len(rows := np.flatnonzero(corners == 0)):
             loops = (faces[first:last] for first, last in zip(starts[rows], starts[rows + 1], strict=True))
             yield "polyhedron", [self._vertices_of(mine) for mine in loops], rows
 
-    def _vertices_of(self, faces: Int64) -> Int64:
+    def _vertices_of(self, faces: Integers) -> Integers:
         """Return the vertices (k,) of some faces."""
         found = [self.vertices[slice(*self.offsets[face : face + 2])] for face in faces.tolist()]
         return np.unique(np.concatenate([self.vertices[:0], *found]))

@@ -166,11 +166,17 @@ def word_of(code: int) -> str:
     return (code - np.iinfo(np.int64).min).to_bytes(8, "little").rstrip(b"\0").decode("latin-1")
 
 
-def rows(text: bytes, at: int, count: int, columns: int) -> tuple[Spans, int]:
-    """Find the words (count, columns, 2) of rows of equally many, wherever lines end, and the offset behind them."""
+def rows(text: bytes, at: int, count: int, columns: int, brackets: bool = False) -> tuple[Spans, int]:
+    """Find the words (count, columns, 2) of rows of equally many, wherever lines end, and the offset behind them.
+
+    Parameters
+    ----------
+    brackets : bool
+        See `text.words`.
+    """
     if not 0 <= count * columns <= len(text) - at:
         raise ReadError(f"is truncated: {counted(count, 'row is', 'rows are')} announced")
-    spans = words(text, at, count * columns)
+    spans = words(text, at, count * columns, brackets)
     return spans.reshape(count, columns, 2), int(spans[-1, 1]) if len(spans) else at
 
 

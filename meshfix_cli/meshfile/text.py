@@ -14,15 +14,20 @@ from meshfix_cli.mesh.elements import counted
 Spans = NDArray[np.int64]  # (..., 2): the offset of the first byte of a word, and the offset behind its last
 
 
-def words(data: bytes, at: int, count: int) -> Spans:
+def words(data: bytes, at: int, count: int, brackets: bool = False) -> Spans:
     """Return the spans (count, 2) of the next words; blanks, line ends and commas separate them.
+
+    Parameters
+    ----------
+    brackets : bool
+        Round ones separate them as well.
 
     Raises
     ------
     ReadError
         The file ends before.
     """
-    spans = kernels.find_words(data, at, count)
+    spans = kernels.find_words(data, at, count, brackets)
     if len(spans) < count:
         announced = counted(count, "number is announced", "numbers are announced")
         raise in_line(data, at, f"{announced}, and the file is truncated")
@@ -55,9 +60,11 @@ def integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int64], int]:
     return values.astype(np.int64, copy=False), end
 
 
-def short_integers(data: bytes, at: int, count: int) -> tuple[NDArray[np.int32] | NDArray[np.int64], int]:
-    """Do the same, in 32 bits where these are enough."""
-    values, end, bad = kernels.scan_integers(data, at, count)
+def short_integers(
+    data: bytes, at: int, count: int, brackets: bool = False
+) -> tuple[NDArray[np.int32] | NDArray[np.int64], int]:
+    """Do the same, in 32 bits where these are enough; `brackets` as in `words`."""
+    values, end, bad = kernels.scan_integers(data, at, count, brackets)
     if bad >= 0:
         raise not_a_number(data, bad, "an integer")
     return values, end

@@ -179,6 +179,32 @@ def test_integers_take_64_bits_where_they_need_them(threads: int) -> None:
         assert (values.dtype.name, int(values[-1]), bad) == (dtype, -largest, -1)
 
 
+def test_brackets_separate_words_of_lists(threads: int) -> None:
+    data = b"(1 -2)(+3\n(" * 50_000
+    values, end, bad = kernels.scan_integers(data, 0, 150_000, brackets=True)
+    assert (values.tolist(), end, bad) == ([1, -2, 3] * 50_000, len(data) - 2, -1)
+    spans = words(data, 0, 150_000, brackets=True)
+    np.testing.assert_array_equal(integers_at(data, spans), values)
+    assert kernels.scan_integers(data, 0, 1)[2] == 0
+
+
+def test_lists_of_integers_are_read(random: np.random.Generator) -> None:
+    expected = [random.integers(-9, 10**9, size).tolist() for size in random.integers(0, 6, 1000)]
+    data = ("\n ".join(f"{len(one)} ( {' '.join(map(str, one))})" for one in expected) + ")").encode()
+    offsets, values, end, good = kernels.read_integer_lists(data, 0, len(expected))
+    assert (values.dtype.name, end, good) == ("int32", len(data) - 1, True)
+    assert [part.tolist() for part in np.split(values, offsets[1:-1])] == expected
+    assert kernels.read_integer_lists(b"2(1 -3000000000)", 0, 1)[1].tolist() == [1, -3_000_000_000]
+
+
+@pytest.mark.parametrize(
+    "data", [b"", b"1", b"1(", b"1(2", b"1()", b"1(2 3)", b"-1(2)", b"1((2))", b"2(1)(2)", b"1(x)", b"1 2"]
+)
+def test_what_is_no_list_of_integers_ends_them(data: bytes) -> None:
+    offsets, _, end, good = kernels.read_integer_lists(b"1(0)" + data, 0, 2)
+    assert (offsets.tolist(), end, good) == ([0, 1], 4, False)
+
+
 def test_long_texts_are_written_in_pieces(threads: int, random: np.random.Generator) -> None:
     values = random.random(100_000)
     text, spans = kernels.shortest(values, False, 0)

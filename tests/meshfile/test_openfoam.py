@@ -10,7 +10,7 @@ import pytest
 from commands import run
 from elements import MESHES
 from files_medit import material
-from files_openfoam import header, labels, read_independently, write
+from files_openfoam import faces_of, header, labels, read_independently, write
 from shapes import block
 
 from meshfix_cli import read, untangle
@@ -18,6 +18,7 @@ from meshfix_cli import write as write_mesh
 from meshfix_cli.errors import MeshfixError, ReadError
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.faces import Faces
 
 SOLID = [name for name, make in MESHES.items() if make()[0].shape[1] == 3]
 FORMS = {
@@ -174,6 +175,47 @@ def test_polyhedra_are_held_and_named(tmp_path: Path) -> None:
     assert document.not_judged == {"polyhedron": 1}
     assert document.mesh.topology.m == 2
     assert document.mesh.check()[0] == 0
+
+
+def test_comments_may_stand_in_lists(tmp_path: Path) -> None:
+    """They are no numbers, and stay where they were."""
+    folder = tangled(tmp_path / "case", "text")
+    expected, there = read(folder).source, folder / "constant" / "polyMesh"
+    for path in there.iterdir():
+        at = path.read_bytes().rindex(b"(\n") + 2
+        path.write_bytes(path.read_bytes()[:at] + b"// 7 (\n/* 3(0 1 2)\n*/" + path.read_bytes()[at:])
+    found = read(folder).source
+    assert found.points.tobytes() == expected.points.tobytes()
+    for one, other in zip(found.cells, expected.cells, strict=True):
+        np.testing.assert_array_equal(one.vertices, other.vertices)
+    assert found.arrays.point_sets["probes"].tolist() == [3]
+    run("untangle", "-q", folder, tmp_path / "out")
+    assert b"// 7 (\n/* 3(0 1 2)\n*/" in (tmp_path / "out" / "constant" / "polyMesh" / "points").read_bytes()
+
+
+@pytest.mark.parametrize("name", SOLID)
+def test_numbers_of_32_and_of_64_bits_make_the_same_cells(name: str) -> None:
+    faces, owner, neighbour = faces_of(MESHES[name]()[1])
+    lists = [
+        np.cumsum([0, *map(len, faces)]),
+        np.concatenate(faces),
+        owner,
+        neighbour + [-1] * (len(faces) - len(neighbour)),
+    ]
+    one, other = (Faces._make(np.array(values, dtype=kind) for values in lists) for kind in ("i4", "i8"))
+    for (key, vertices, cells), (kind, nodes, ids) in zip(one.elements(), other.elements(), strict=True):
+        assert (key, vertices.dtype, nodes.dtype) == (kind, np.int32, np.int64)
+        np.testing.assert_array_equal(vertices, nodes)
+        np.testing.assert_array_equal(cells, ids)
+
+
+def test_points_of_later_times_are_told(tmp_path: Path) -> None:
+    folder = tangled(tmp_path / "case", "text")
+    assert read(folder).notes == ()
+    for time, name in (("0.5", "points"), ("0.25", "points.gz"), ("old", "points")):
+        (folder / time / "polyMesh").mkdir(parents=True)
+        (folder / time / "polyMesh" / name).touch()
+    assert "as in 0.5/polyMesh" in " ".join(read(folder).notes)
 
 
 def test_a_mesh_of_openfoam_becomes_another_file(tmp_path: Path) -> None:

@@ -169,14 +169,21 @@ auto fixed_facets_py(const PyConnectivity& self, const Vector<const bool>& movab
                            to_numpy(std::move(found.owners)), to_numpy(std::move(found.shared)));
 }
 
-nb::tuple cells_of_faces_py(const Vector<const std::int64_t>& offsets, const Vector<const std::int64_t>& vertices,
-                            const Vector<const std::int64_t>& owner, const Vector<const std::int64_t>& neighbour,
-                            std::int64_t cells, int threads) {
-    const FacesView faces{offsets.data(), vertices.data(), owner.data(), neighbour.data(),
-                          static_cast<std::int64_t>(owner.shape(0))};
-    CellsOfFaces found = cells_of_faces(faces, cells, threads);
+template <class Index>
+nb::tuple cells_of_faces_py(const Vector<const Index>& offsets, const Vector<const Index>& vertices,
+                            const Vector<const Index>& owner, const Vector<const Index>& neighbour, std::int64_t cells,
+                            int threads) {
+    const FacesView<Index> faces{offsets.data(), vertices.data(), owner.data(), neighbour.data(),
+                                 static_cast<std::int64_t>(owner.shape(0))};
+    CellsOfFaces<Index> found = cells_of_faces(faces, cells, threads);
     return nb::make_tuple(to_numpy(std::move(found.starts)), to_numpy(std::move(found.faces)),
-                          to_numpy(std::move(found.corners)), to_numpy(std::move(found.nodes), CellsOfFaces::NODES));
+                          to_numpy(std::move(found.corners)), to_numpy(std::move(found.nodes), found.width));
+}
+
+template <class Index>
+void bind_cells_of_faces(nb::module_& m) {
+    m.def("cells_of_faces", &cells_of_faces_py<Index>, "offsets"_a.noconvert(), "vertices"_a.noconvert(),
+          "owner"_a.noconvert(), "neighbour"_a.noconvert(), "cells"_a, "threads"_a);
 }
 
 // Rows of a shape's code, the group of parallel edges, which is another than that of the row before, and two nodes.
@@ -380,8 +387,8 @@ void bind_mesh(nb::module_& m) {
         .def_prop_ro("neighbours", &view<&Connectivity::neighbours>)
         .def_prop_ro("colour_offsets", &view<&Connectivity::colour_offsets>)
         .def_prop_ro("colour_blocks", &view<&Connectivity::colour_blocks>);
-    m.def("cells_of_faces", &cells_of_faces_py, "offsets"_a.noconvert(), "vertices"_a.noconvert(), "owner"_a.noconvert(),
-          "neighbour"_a.noconvert(), "cells"_a, "threads"_a);
+    bind_cells_of_faces<std::int32_t>(m);
+    bind_cells_of_faces<std::int64_t>(m);
 }
 
 }  // namespace meshfix

@@ -14,118 +14,135 @@
 
 namespace meshfix {
 
+// `Index` has 32 bits where these are enough for all numbers.
+template <class Index>
 struct FacesView {
-    const std::int64_t *offsets, *vertices, *owner, *neighbour;  // neighbour: -1 where there is no cell
+    const Index *offsets, *vertices, *owner, *neighbour;  // neighbour: -1 where there is no cell
     std::int64_t count;
 };
 
+template <class Index>
 struct CellsOfFaces {
-    static constexpr int NODES = 8;
-    std::vector<std::int64_t> starts;  // of the sides of each cell, and of all
-    std::vector<std::int64_t> faces;   // on which they are
+    std::vector<Index> starts;         // of the sides of each cell, and of all
+    std::vector<Index> faces;          // on which they are
     std::vector<std::int8_t> corners;  // of each cell: 4, 5, 6 or 8, by which it is known; 0: it is none of the elements
-    std::vector<std::int64_t> nodes;   // NODES of each cell
+    int width = 8;                     // as many nodes as any may have
+    std::vector<Index> nodes;          // `width` of each cell
 };
 
 // The loops of a cell's faces, seen from outside.
+template <class Index>
 class CellLoops {
   public:
-    void add(const FacesView& mesh, std::int64_t face, bool inner) {
-        const std::int64_t first = mesh.offsets[face], size = mesh.offsets[face + 1] - first;
+    void add(const FacesView<Index>& mesh, Index face, bool inner) {
+        const Index first = mesh.offsets[face], size = mesh.offsets[face + 1] - first;
         whole_ &= count_ < 6 && (size == 3 || size == 4);
         if (!whole_) return;
         quads_ += size == 4;
         sizes_[count_] = static_cast<int>(size);
-        for (std::int64_t i = 0; i < size; ++i) loops_[count_][i] = mesh.vertices[first + (inner ? size - 1 - i : i)];
+        for (Index i = 0; i < size; ++i) loops_[count_][i] = mesh.vertices[first + (inner ? size - 1 - i : i)];
         ++count_;
     }
 
     // The number of nodes of the element that it is, which are written; 0: it is none.
-    int order(std::int64_t* nodes) const {
+    int order(Index* nodes) const {
         if (!whole_) return 0;
-        if (count_ == 4 && quads_ == 0) return cone(3, nodes);
-        if (count_ == 5 && quads_ == 1) return cone(4, nodes);
-        if (count_ == 5 && quads_ == 3) return prism(3, nodes);
-        return count_ == 6 && quads_ == 6 ? prism(4, nodes) : 0;
+        if (count_ == 4 && quads_ == 0) return cone<3>(nodes);
+        if (count_ == 5 && quads_ == 1) return cone<4>(nodes);
+        if (count_ == 5 && quads_ == 3) return prism<3>(nodes);
+        return count_ == 6 && quads_ == 6 ? prism<4>(nodes) : 0;
     }
 
   private:
-    std::array<std::array<std::int64_t, 4>, 6> loops_{};
+    std::array<std::array<Index, 4>, 6> loops_;
     std::array<int, 6> sizes_{};
     int count_ = 0, quads_ = 0;
     bool whole_ = true;
 
     int base_of(int size) const { return static_cast<int>(std::find(sizes_.begin(), sizes_.end(), size) - sizes_.begin()); }
 
-    void bottom(int base, std::int64_t* nodes) const {
-        const int size = sizes_[base];
+    template <int SIZE>
+    void bottom(int base, Index* nodes) const {
         nodes[0] = loops_[base][0];
-        for (int i = 1; i < size; ++i) nodes[i] = loops_[base][size - i];
+        for (int i = 1; i < SIZE; ++i) nodes[i] = loops_[base][SIZE - i];
     }
 
-    static bool among(const std::int64_t* nodes, int count, std::int64_t vertex) {
-        return std::find(nodes, nodes + count, vertex) != nodes + count;
+    // Of which it is has no order that a processor could foresee, and so all are looked at.
+    template <int COUNT>
+    static bool among(const Index* nodes, Index vertex) {
+        bool found = false;
+        for (int i = 0; i < COUNT; ++i) found |= nodes[i] == vertex;
+        return found;
     }
 
     // Whether these nodes differ, and the faces have no others.
-    bool has_all(const std::int64_t* nodes, int count) const {
-        for (int i = 0; i < count; ++i)
-            if (among(nodes, i, nodes[i])) return false;
+    template <int COUNT>
+    bool has_all(const Index* nodes) const {
+        bool good = true;
+        for (int i = 0; i < COUNT; ++i)
+            for (int j = 0; j < i; ++j) good &= nodes[i] != nodes[j];
         for (int f = 0; f < count_; ++f)
-            for (int i = 0; i < sizes_[f]; ++i)
-                if (!among(nodes, count, loops_[f][i])) return false;
-        return true;
+            for (int i = 0; i < sizes_[f]; ++i) good &= among<COUNT>(nodes, loops_[f][i]);
+        return good;
     }
 
-    int cone(int size, std::int64_t* nodes) const {
-        const int base = base_of(size), side = base == 0 ? 1 : 0;
-        bottom(base, nodes);
-        nodes[size] = -1;
+    template <int SIZE>
+    int cone(Index* nodes) const {
+        const int base = base_of(SIZE), side = base == 0 ? 1 : 0;
+        bottom<SIZE>(base, nodes);
+        nodes[SIZE] = -1;
         for (int i = 0; i < sizes_[side]; ++i)
-            if (!among(nodes, size, loops_[side][i])) nodes[size] = loops_[side][i];
-        return nodes[size] >= 0 && has_all(nodes, size + 1) ? size + 1 : 0;
+            if (!among<SIZE>(nodes, loops_[side][i])) nodes[SIZE] = loops_[side][i];
+        return nodes[SIZE] >= 0 && has_all<SIZE + 1>(nodes) ? SIZE + 1 : 0;
     }
 
-    int prism(int size, std::int64_t* nodes) const {
-        const int base = base_of(size);
-        bottom(base, nodes);
-        std::fill(nodes + size, nodes + 2 * size, std::int64_t{-1});
+    template <int SIZE>
+    int prism(Index* nodes) const {
+        const int base = base_of(SIZE);
+        bottom<SIZE>(base, nodes);
+        std::fill(nodes + SIZE, nodes + 2 * SIZE, Index{-1});
         for (int f = 0; f < count_; ++f) {
             for (int i = 0; f != base && i < sizes_[f]; ++i) {
-                const std::int64_t above = loops_[f][(i + 1) % sizes_[f]];
-                const auto under = std::find(nodes, nodes + size, loops_[f][i]) - nodes;
-                if (under == size || among(nodes, size, above)) continue;
-                if (nodes[size + under] >= 0) return 0;
-                nodes[size + under] = above;
+                const Index above = loops_[f][(i + 1) % sizes_[f]];
+                const auto under = std::find(nodes, nodes + SIZE, loops_[f][i]) - nodes;
+                if (under == SIZE || among<SIZE>(nodes, above)) continue;
+                if (nodes[SIZE + under] >= 0) return 0;
+                nodes[SIZE + under] = above;
             }
         }
-        return !among(nodes + size, size, -1) && has_all(nodes, 2 * size) ? 2 * size : 0;
+        return !among<SIZE>(nodes + SIZE, -1) && has_all<2 * SIZE>(nodes) ? 2 * SIZE : 0;
     }
 };
 
 // `cells` is more than any number of a cell.
-inline CellsOfFaces cells_of_faces(const FacesView& mesh, std::int64_t cells, int threads) {
-    CellsOfFaces found;
+template <class Index>
+CellsOfFaces<Index> cells_of_faces(const FacesView<Index>& mesh, std::int64_t cells, int threads) {
+    CellsOfFaces<Index> found;
     found.starts.assign(cells + 1, 0);
-    const auto each_side = [&](const auto& f) {
-        for (std::int64_t face = 0; face < mesh.count; ++face) {
+    const auto each_side = [&](const auto& f) {  // ~face: seen from its neighbour
+        for (Index face = 0; face < mesh.count; ++face) {
             f(mesh.owner[face], face);
-            if (mesh.neighbour[face] >= 0) f(mesh.neighbour[face], face);
+            if (mesh.neighbour[face] >= 0) f(mesh.neighbour[face], ~face);
         }
     };
-    each_side([&](std::int64_t cell, std::int64_t) { ++found.starts[cell + 1]; });
+    each_side([&](Index cell, Index) { ++found.starts[cell + 1]; });
+    const Index most = *std::max_element(found.starts.begin(), found.starts.end());
+    found.width = most <= 4 ? 4 : most == 5 ? 6 : 8;
     std::partial_sum(found.starts.begin(), found.starts.end(), found.starts.begin());
     found.faces.resize(found.starts.back());
-    std::vector<std::int64_t> next(found.starts.begin(), found.starts.end() - 1);
-    each_side([&](std::int64_t cell, std::int64_t face) { found.faces[next[cell]++] = face; });
+    std::vector<Index> next(found.starts.begin(), found.starts.end() - 1);
+    each_side([&](Index cell, Index side) { found.faces[next[cell]++] = side; });
     found.corners.resize(cells);
-    found.nodes.resize(CellsOfFaces::NODES * cells);
+    found.nodes.resize(found.width * cells);
     for_each_range(cells, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         for (std::int64_t cell = begin; cell < end; ++cell) {
-            CellLoops loops;
-            for (std::int64_t i = found.starts[cell]; i < found.starts[cell + 1]; ++i)
-                loops.add(mesh, found.faces[i], mesh.owner[found.faces[i]] != cell);
-            std::int64_t* const nodes = found.nodes.data() + CellsOfFaces::NODES * cell;
+            CellLoops<Index> loops;
+            for (Index i = found.starts[cell]; i < found.starts[cell + 1]; ++i) {
+                const bool inner = found.faces[i] < 0;
+                if (inner) found.faces[i] = ~found.faces[i];
+                loops.add(mesh, found.faces[i], inner);
+            }
+            Index* const nodes = found.nodes.data() + found.width * cell;
             found.corners[cell] = static_cast<std::int8_t>(loops.order(nodes));
         }
     });

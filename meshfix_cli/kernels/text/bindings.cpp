@@ -3,6 +3,7 @@
 
 #include "arrays.hpp"
 #include "text/cards.hpp"
+#include "text/lists.hpp"
 #include "text/text.hpp"
 
 namespace meshfix {
@@ -17,8 +18,8 @@ std::string_view word_at(std::string_view text, const std::int64_t* span) {
     return text.substr(static_cast<std::size_t>(span[0]), static_cast<std::size_t>(span[1] - span[0]));
 }
 
-auto find_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
-    return to_numpy(find_words(view_of(data), at, count, text_threads), 2);
+auto find_words_py(const nb::bytes& data, std::int64_t at, std::int64_t count, bool brackets) {
+    return to_numpy((brackets ? find_words<true> : find_words<false>)(view_of(data), at, count, text_threads), 2);
 }
 
 auto line_words_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t count) {
@@ -82,10 +83,26 @@ nb::tuple integers_of(Integers<T>&& read) {
 }
 
 // In 32 bits where that is enough.
-nb::tuple scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
-    auto read = read_integers<std::int32_t>(view_of(data), at, count, text_threads);
+template <bool BRACKETS>
+nb::tuple scan_integers_in(std::string_view text, std::int64_t at, std::int64_t count) {
+    auto read = read_integers<std::int32_t, BRACKETS>(text, at, count, text_threads);
     if (read.fit) return integers_of(std::move(read));
-    return integers_of(read_integers<std::int64_t>(view_of(data), at, count, text_threads));
+    return integers_of(read_integers<std::int64_t, BRACKETS>(text, at, count, text_threads));
+}
+
+nb::tuple scan_integers_py(const nb::bytes& data, std::int64_t at, std::int64_t count, bool brackets) {
+    return (brackets ? scan_integers_in<true> : scan_integers_in<false>)(view_of(data), at, count);
+}
+
+template <class T>
+nb::tuple integer_lists_of(IntegerLists<T>&& read) {
+    return nb::make_tuple(to_numpy(std::move(read.offsets)), to_numpy(std::move(read.values)), read.end, read.good);
+}
+
+nb::tuple read_integer_lists_py(const nb::bytes& data, std::int64_t at, std::int64_t count) {
+    auto read = read_integer_lists<std::int32_t>(view_of(data), at, count);
+    if (read.fit) return integer_lists_of(std::move(read));
+    return integer_lists_of(read_integer_lists<std::int64_t>(view_of(data), at, count));
 }
 
 template <class Real, class Value, class Read>
@@ -196,7 +213,7 @@ nb::bytes replace_py(const nb::bytes& data, std::int64_t first, std::int64_t las
 }  // namespace
 
 void bind_text(nb::module_& m) {
-    m.def("find_words", &find_words_py, "data"_a, "at"_a, "count"_a);
+    m.def("find_words", &find_words_py, "data"_a, "at"_a, "count"_a, "brackets"_a = false);
     m.def("line_words", &line_words_py, "data"_a, "offsets"_a.noconvert(), "count"_a);
     m.def("find_lines", &find_lines_py, "data"_a, "at"_a, "count"_a);
     m.def("read_lines", &read_lines_py, "data"_a, "at"_a, "count"_a);
@@ -205,7 +222,8 @@ void bind_text(nb::module_& m) {
     m.def("card_integers", &card_integers_py, "data"_a, "offsets"_a.noconvert(), "first"_a, "last"_a, "texts"_a);
     m.def("behind_words", &behind_words_py, "data"_a, "at"_a, "count"_a);
     m.def("use_threads", [](int threads) { text_threads = threads; }, "threads"_a);
-    m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a);
+    m.def("scan_integers", &scan_integers_py, "data"_a, "at"_a, "count"_a, "brackets"_a = false);
+    m.def("read_integer_lists", &read_integer_lists_py, "data"_a, "at"_a, "count"_a);
     m.def("integers", &integers_py, "data"_a, "spans"_a.noconvert(), "slash"_a);
     m.def("numbers", &numbers_py, "data"_a, "spans"_a.noconvert(), "single"_a);
     m.def("read_fields", &read_fields_py, "data"_a, "spans"_a.noconvert());

@@ -1,7 +1,8 @@
 // Numbers in text files: where they are, what they say, and the shortest text for one.
 //
-// A word is a run of bytes that are neither blanks, control characters nor commas. A span is the offset of its first
-// byte and the offset behind its last. Nothing here allocates by what a file announces.
+// A word is a run of bytes that are neither blanks, control characters nor commas nor, where these are `BRACKETS` of
+// lists, round ones. A span is the offset of its first byte and the offset behind its last. Nothing here allocates by
+// what a file announces.
 #pragma once
 
 #include <charconv>
@@ -22,17 +23,21 @@ struct Span {
     std::int64_t begin = -1, end = -1;
 };
 
-inline bool separates(char c) { return static_cast<unsigned char>(c) <= ' ' || c == ','; }
+template <bool BRACKETS = false>
+bool separates(char c) {
+    return static_cast<unsigned char>(c) <= ' ' || c == ',' || (BRACKETS && (c == '(' || c == ')'));
+}
 inline bool ends_line(char c) { return c == '\n' || c == '\r'; }
 
 // The first word at or behind `at`; none in the rest of the text, or of the line: begin = -1.
-inline Span next_word(std::string_view text, std::int64_t at, bool one_line) {
+template <bool BRACKETS = false>
+Span next_word(std::string_view text, std::int64_t at, bool one_line) {
     const auto size = static_cast<std::int64_t>(text.size());
-    for (; at < size && separates(text[at]); ++at)
+    for (; at < size && separates<BRACKETS>(text[at]); ++at)
         if (one_line && ends_line(text[at])) return {};
     if (at >= size) return {};
     Span word{at, at};
-    while (word.end < size && !separates(text[word.end])) ++word.end;
+    while (word.end < size && !separates<BRACKETS>(text[word.end])) ++word.end;
     return word;
 }
 
@@ -43,23 +48,27 @@ struct Pieces {
     std::int64_t pieces() const { return static_cast<std::int64_t>(begin.size()) - 1; }
     std::int64_t words() const { return first.back(); }
     // Where to look for the first word of a piece: behind one that began in the piece before.
+    template <bool BRACKETS = false>
     std::int64_t first_word(std::string_view text, std::int64_t piece) const {
         std::int64_t at = begin[piece];
-        if (piece > 0 && !separates(text[at - 1]))
-            while (at < begin[piece + 1] && !separates(text[at])) ++at;
+        if (piece > 0 && !separates<BRACKETS>(text[at - 1]))
+            while (at < begin[piece + 1] && !separates<BRACKETS>(text[at])) ++at;
         return at;
     }
 };
 
 // How many words begin in a part of the text; `at` is where all of them begin.
-inline std::int64_t count_words(std::string_view text, std::int64_t at, std::int64_t begin, std::int64_t end) {
-    std::int64_t count = begin < end && !separates(text[begin]) && (begin == at || separates(text[begin - 1]));
-    for (std::int64_t i = begin + 1; i < end; ++i) count += separates(text[i - 1]) & !separates(text[i]);
+template <bool BRACKETS>
+std::int64_t count_words(std::string_view text, std::int64_t at, std::int64_t begin, std::int64_t end) {
+    const auto separate = separates<BRACKETS>;
+    std::int64_t count = begin < end && !separate(text[begin]) && (begin == at || separate(text[begin - 1]));
+    for (std::int64_t i = begin + 1; i < end; ++i) count += separate(text[i - 1]) & !separate(text[i]);
     return count;
 }
 
 // As many pieces as it takes to have `count` words, or all there are.
-inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+template <bool BRACKETS = false>
+Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
     constexpr std::int64_t LARGE = 1 << 18;
     const auto size = static_cast<std::int64_t>(text.size());
     const std::int64_t piece = std::clamp<std::int64_t>(8 * std::clamp<std::int64_t>(count, 0, size), 64, LARGE);
@@ -70,7 +79,7 @@ inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, in
         const std::int64_t batch = std::min<std::int64_t>(left, 4 * threads);
         std::vector<std::int64_t> counts(batch);
         for_each_item(batch, threads, [&](std::int64_t i) {
-            counts[i] = count_words(text, at, begin + i * piece, std::min(size, begin + (i + 1) * piece));
+            counts[i] = count_words<BRACKETS>(text, at, begin + i * piece, std::min(size, begin + (i + 1) * piece));
         });
         for (std::int64_t i = 0; i < batch && pieces.words() < count; ++i) {
             pieces.begin.push_back(std::min(size, begin + (i + 1) * piece));
@@ -81,24 +90,26 @@ inline Pieces cut(std::string_view text, std::int64_t at, std::int64_t count, in
 }
 
 // Calls f(piece, at, first, last) for each piece: where its own words begin, and their numbers, below `count`.
-template <class F>
+template <bool BRACKETS, class F>
 void for_each_piece(std::string_view text, const Pieces& pieces, std::int64_t count, int threads, const F& f) {
     for_each_item(pieces.pieces(), threads, [&](std::int64_t p) {
-        f(p, pieces.first_word(text, p), pieces.first[p], std::min(count, pieces.first[p + 1]));
+        f(p, pieces.first_word<BRACKETS>(text, p), pieces.first[p], std::min(count, pieces.first[p + 1]));
     });
 }
 
 // The spans of the words from an offset on, as many as there are, at most `count`.
-inline std::vector<std::int64_t> find_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
-    const Pieces pieces = cut(text, at, count, threads);
+template <bool BRACKETS>
+std::vector<std::int64_t> find_words(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
+    const Pieces pieces = cut<BRACKETS>(text, at, count, threads);
     std::vector<std::int64_t> spans(2 * std::clamp<std::int64_t>(count, 0, pieces.words()));
-    for_each_piece(text, pieces, count, threads, [&](std::int64_t, std::int64_t at, std::int64_t first, std::int64_t last) {
+    const auto find = [&](std::int64_t, std::int64_t at, std::int64_t first, std::int64_t last) {
         for (std::int64_t i = first; i < last; ++i) {
-            const Span word = next_word(text, at, false);
+            const Span word = next_word<BRACKETS>(text, at, false);
             spans[2 * i] = word.begin;
             spans[2 * i + 1] = at = word.end;
         }
-    });
+    };
+    for_each_piece<BRACKETS>(text, pieces, count, threads, find);
     return spans;
 }
 
@@ -172,14 +183,14 @@ inline int read_few_digits(const char* p, const char* end, std::int64_t& value) 
 #endif
 }
 
-// Finds the next word and reads it, if it is a plain integer of at most 18 digits, in one pass; false: it is none, and
-// `at` stays.
-inline bool read_plain_integer(std::string_view text, std::int64_t& at, std::int64_t& value) {
+// Reads the plain integer of at most 18 digits that begins at an offset, in one pass; false: there is none, and `at`
+// stays.
+template <bool BRACKETS>
+bool read_digits(std::string_view text, std::int64_t& at, std::int64_t& value) {
     const char *p = text.data() + at, *const end = text.data() + text.size();
-    while (p < end && separates(*p)) ++p;
     const int few = read_few_digits(p, end, value);
-    if (few > 0 && separates(p[few])) {
-        at = p + few - text.data();
+    if (few > 0 && separates<BRACKETS>(p[few])) {
+        at += few;
         return true;
     }
     const bool minus = p < end && *p == '-';
@@ -191,9 +202,20 @@ inline bool read_plain_integer(std::string_view text, std::int64_t& at, std::int
         if (digit > 9) break;
         value = 10 * value + digit;
     }
-    if (p == digits || (p < end && !separates(*p))) return false;
+    if (p == digits || (p < end && !separates<BRACKETS>(*p))) return false;
     if (minus) value = -value;
     at = p - text.data();
+    return true;
+}
+
+// Does the same with the next word.
+template <bool BRACKETS = false>
+bool read_plain_integer(std::string_view text, std::int64_t& at, std::int64_t& value) {
+    const auto size = static_cast<std::int64_t>(text.size());
+    std::int64_t begin = at;
+    while (begin < size && separates<BRACKETS>(text[begin])) ++begin;
+    if (!read_digits<BRACKETS>(text, begin, value)) return false;
+    at = begin;
     return true;
 }
 
@@ -245,22 +267,22 @@ struct Integers {
     bool fit = true;       // all are numbers of the type
 };
 
-template <class T>
+template <class T, bool BRACKETS>
 Integers<T> read_integers(std::string_view text, std::int64_t at, std::int64_t count, int threads) {
     struct Part {
         std::int64_t bad = -1, end = -1, read = 0;
         bool fit = true;
     };
-    const Pieces pieces = cut(text, at, count, threads);
+    const Pieces pieces = cut<BRACKETS>(text, at, count, threads);
     Integers<T> result{{}, at};
     result.values.resize(std::clamp<std::int64_t>(count, 0, pieces.words()));
     std::vector<Part> parts(pieces.pieces());
-    for_each_piece(text, pieces, count, threads, [&](std::int64_t p, std::int64_t at, std::int64_t first, std::int64_t last) {
+    const auto read_piece = [&](std::int64_t p, std::int64_t at, std::int64_t first, std::int64_t last) {
         Part part;
         for (std::int64_t i = first; i < last; ++i, ++part.read) {
             std::int64_t value = 0;
-            if (!read_plain_integer(text, at, value)) {
-                const Span word = next_word(text, at, false);
+            if (!read_plain_integer<BRACKETS>(text, at, value)) {
+                const Span word = next_word<BRACKETS>(text, at, false);
                 if (!read_integer(text.substr(word.begin, word.end - word.begin), value, false)) {
                     part.bad = word.begin;
                     break;
@@ -272,7 +294,8 @@ Integers<T> read_integers(std::string_view text, std::int64_t at, std::int64_t c
             part.end = at;
         }
         parts[p] = part;
-    });
+    };
+    for_each_piece<BRACKETS>(text, pieces, count, threads, read_piece);
     std::int64_t read = 0;
     for (const Part& part : parts) {
         read += part.read;

@@ -18,7 +18,7 @@ import numpy as np
 from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.compressed import is_compressed, packed, unpacked
 from meshfix_cli.meshfile.faces import Faces
-from meshfix_cli.meshfile.openfoam.lists import File
+from meshfix_cli.meshfile.openfoam.lists import File, Labels
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places, Points, Turned
 from meshfix_cli.meshfile.tables import Int64, Runs
@@ -27,6 +27,7 @@ from meshfix_cli.meshfile.together import Together
 SUFFIX = ".foam"
 _ZONE = "openfoam:zone"
 _SIZES = {3: "triangle", 4: "quad"}
+_TIME = re.compile(r"\d+(\.\d*)?(e[+-]?\d+)?")
 _RANGE = re.compile(rb"\b(nFaces|startFace)\s+(\d{1,18})\s*;")
 
 
@@ -69,9 +70,24 @@ def parse(_: bytes, path: Path | None) -> Source:
             new = layout.rewritten(original, moved, turned)
             return [contents[0] if new == data else packed(new) if is_compressed(contents[0]) else new]
 
-        return replace(source, pieces=Together(path, [points], layout, written, read, [*copied, *marked], places))
+        pieces = Together(path, [points], layout, written, read, [*copied, *marked], places)
+        return replace(source, pieces=pieces, notes=_of_later_times(folder))
 
     return read([points.read_bytes()])
+
+
+def _of_later_times(folder: Path) -> tuple[str, ...]:
+    """Tell of the points that a mesh in motion has in a folder of its own for each time."""
+    parts = folder.resolve().parts
+    if "constant" not in parts:
+        return ()
+    at = len(parts) - 1 - parts[::-1].index("constant")
+    case, rest = Path(*parts[:at]), Path(*parts[at + 1 :])
+    times = {one.relative_to(case).parts[0] for one in case.glob(f"*/{rest}/points*")}
+    found = sorted((time for time in times if _TIME.fullmatch(time)), key=float)
+    if not found:
+        return ()
+    return (f"the points of constant are read, and those of later times, as in {found[-1]}/{rest}, stay as they are",)
 
 
 def _file(folder: Path, name: str) -> Path | None:
@@ -110,13 +126,13 @@ def _source(data: bytes, folder: Path) -> tuple[Source, InPlace]:
     for name, some in (*_patches(folder), *_zones(folder, "faceZones")):
         _add_facets(runs, faces, name, some)
     point_sets = dict(_zones(folder, "pointZones"))
-    layout = InPlace(points.data, coordinates, runs.corners)
+    layout = InPlace(data, coordinates, runs.corners)
     regions = (_ZONE,) * (len(zones) > 0)
     return Source(coordinates.read(points.data), runs.cells, None, lambda: runs.arrays(point_sets), regions), layout
 
 
 def _faces(folder: Path, n: int) -> Faces:
-    def read(name: str, what: Callable[[File], tuple[Int64, Any]]) -> tuple[Int64, Any]:
+    def read(name: str, what: Callable[[File], tuple[Labels, Any]]) -> tuple[Labels, Any]:
         file = _read(folder, name)
         if file is None:
             raise ReadError(f"is not a readable mesh of OpenFOAM: there is no file {name}")
@@ -130,8 +146,11 @@ def _faces(folder: Path, n: int) -> Faces:
         raise ReadError("is not a readable mesh of OpenFOAM: faces, owner and neighbour do not fit")
     if len(vertices) and not 0 <= vertices.min() <= vertices.max() < n:
         raise ReadError("is not a readable mesh of OpenFOAM: a face names a point that is not there")
-    outside = np.full(count - len(neighbour), -1)
-    return Faces(offsets, vertices, owner, np.concatenate([np.maximum(neighbour, -1), outside]))
+    kind = np.result_type(offsets, vertices, owner, neighbour)
+    both_sides = np.full(count, -1, dtype=kind)
+    np.maximum(neighbour, -1, out=both_sides[: len(neighbour)])
+    offsets, vertices, owner = (values.astype(kind, copy=False) for values in (offsets, vertices, owner))
+    return Faces(offsets, vertices, owner, both_sides)
 
 
 def _patches(folder: Path) -> Iterator[tuple[str, Int64]]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +16,10 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.splice import Places
-from meshfix_cli.meshfile.tables import Int64, chain, rows
-from meshfix_cli.meshfile.text import in_line, integers
+from meshfix_cli.meshfile.tables import Int64, rows, without
+from meshfix_cli.meshfile.text import in_line, integers, short_integers
+
+Labels = NDArray[np.int32] | NDArray[np.int64]
 
 _HEADER = re.compile(rb"FoamFile\s*\{([^}]*)\}")
 _ENTRY = re.compile(rb"(\w+)\s+(\"[^\"]*\"|[^;]*);")
@@ -26,7 +27,7 @@ _BLANK = re.compile(rb"(?:\s|//[^\n]*|/\*(?s:.*?)\*/)*")
 _COUNT = re.compile(rb"(\d{1,18})\s*([({])")
 _NAME = re.compile(rb"\s*(\"[^\"]*\"|[^\s{}();\"]+)\s*\{")
 _TOKEN = re.compile(rb"[{}]|List<(label|bool)>\s*(\d{1,18})\s*([({])")
-_WITHOUT_BRACKETS = bytes.maketrans(b"()", b"  ")
+_COMMENT = re.compile(rb"//[^\n]*|/\*.*?\*/", re.DOTALL)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,7 @@ class File:
     Attributes
     ----------
     data : bytes
+        Of a text, with blanks in the place of comments among what it lists.
     begin : int
         The offset behind the header.
     kind : str
@@ -62,42 +64,37 @@ class File:
             raise ReadError("is not a readable file of OpenFOAM: it has no header")
         entries = {name.decode(): value.strip().decode("latin-1") for name, value in _ENTRY.findall(header[1])}
         sizes = dict(re.findall(r"(label|scalar)=(\d+)", entries.get("arch", "")))
+        binary = entries.get("format", "ascii") == "binary"
         return cls(
-            data, header.end(), entries.get("class", ""), entries.get("format", "ascii") == "binary",
+            data if binary else _without_comments(data, header.end()), header.end(), entries.get("class", ""), binary,
             ">" if "MSB" in entries.get("arch", "") else "<",
             int(sizes.get("label", 32)) // 8, int(sizes.get("scalar", 64)) // 8,
         )  # fmt: skip
 
-    @cached_property
-    def _text(self) -> bytes:
-        return self.data.translate(_WITHOUT_BRACKETS)
-
-    def labels(self, at: int | None = None) -> tuple[Int64, int]:
+    def labels(self, at: int | None = None) -> tuple[Labels, int]:
         """Read a list of integers (k,), here or at an offset, and return the offset behind it."""
         count, begin, uniform = self._list(self.begin if at is None else at)
         if uniform:
             value, end = integers(self.data.replace(b"}", b" "), begin, 1)
             return np.full(count, value[0]), self._closed(end, b"}")
         if not self.binary:
-            short, end, bad = kernels.scan_integers(self.data, begin, count)
-            if bad >= 0:  # the last may stand beside its bracket
-                short, end = integers(self._text, begin, count)
-            return short.astype(np.int64, copy=False), self._closed(end)
-        values = np.frombuffer(self.data, f"{self.order}i{self.label}", self._claimed(count, begin, self.label), begin)
-        return values.astype(np.int64), self._closed(begin + values.nbytes)
+            values, end = short_integers(self.data, begin, count, brackets=True)
+            return values, self._closed(end)
+        found = np.frombuffer(self.data, f"{self.order}i{self.label}", self._claimed(count, begin, self.label), begin)
+        return found.astype(found.dtype.newbyteorder("="), copy=False), self._closed(begin + found.nbytes)
 
     def vectors(self) -> Places:
         """Find the places (n, 3) of a list of vectors."""
         count, begin, _ = self._list(self.begin)
         if not self.binary:
-            spans, end = rows(self._text, begin, count, 3)
+            spans, end = rows(self.data, begin, count, 3, brackets=True)
             self._closed(end)
             return Places.of_text(spans)
         size = 3 * self.scalar
         self._closed(begin + size * self._claimed(count, begin, size))
         return Places.of_rows(begin + size * np.arange(count), 3, f"{self.order}f{self.scalar}")
 
-    def faces(self) -> tuple[Int64, NDArray[np.int64]]:
+    def faces(self) -> tuple[Labels, Labels]:
         """Read a list of lists: offsets (f+1,) and vertices (k,)."""
         if self.kind == "faceCompactList":
             offsets, end = self.labels()
@@ -106,15 +103,11 @@ class File:
                 raise ReadError("is not a readable file of OpenFOAM: the offsets of its faces do not fit")
             return offsets, vertices
         count, begin, _ = self._list(self.begin)
-        values, end, _ = kernels.scan_integers(self._text, begin, len(self.data))  # up to the first word that is none
-        self._closed(end, b"))" if count else b")")
-        each, rest = divmod(len(values), max(count, 1))
-        if count and not rest and (values[::each] == each - 1).all():
-            return (each - 1) * np.arange(count + 1), values.reshape(count, each)[:, 1:].ravel().astype(np.int64)
-        starts = chain(values, count, "numbers of vertices of its faces")
-        return np.concatenate([[0], np.cumsum(values[starts], dtype=np.int64)]), np.delete(values, starts).astype(
-            np.int64
-        )
+        offsets, vertices, end, good = kernels.read_integer_lists(self.data, begin, count)
+        if not good:
+            raise in_line(self.data, end + 1, f"there are not {counted(count, 'list', 'lists')} of integers")
+        self._closed(end)
+        return offsets, vertices
 
     def blocks(self) -> Iterator[tuple[str, bytes, Int64]]:
         """Give the names of the dictionaries of a list, what each holds up to a list of its own, and the first such."""
@@ -131,7 +124,7 @@ class File:
                     raise ReadError("is truncated: an entry does not end")
                 if token[1] == b"label":
                     values, at = self.labels(token.start(2))
-                    found, end = (values, token.start()) if end == begin else (found, end)
+                    found, end = (values.astype(np.int64), token.start()) if end == begin else (found, end)
                 elif token[1]:
                     at = self._behind_bools(token)
                 else:
@@ -171,3 +164,10 @@ class File:
                 )
             at += 1
         return at
+
+
+def _without_comments(data: bytes, begin: int) -> bytes:
+    """Return the data with blanks in the place of comments, if there are some between the brackets of its list."""
+    first = _BLANK.match(data, begin)
+    at = data.find(b"/", first.end() if first else begin, max(0, data.rfind(b")")))
+    return without(data, _COMMENT) if at >= 0 else data

@@ -23,7 +23,7 @@ from meshfix_cli.meshfile.tables import Int64, IntegerLines, Numbering, Runs, al
 from meshfix_cli.meshfile.text import Spans, in_line, integers
 
 _COMMENT = re.compile(rb"(?m)^[ \t]*#[^\n\r]*")
-_BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?\s*MFEM (?:(\w+) )?mesh v(\d+\.\d+)[^\n\r]*")
+_BEGIN = re.compile(rb"\s*MFEM (?:(\w+) )?mesh v(\d+\.\d+)[^\n\r]*")
 _WORD = re.compile(rb"\s*([A-Za-z_]\w*)(?!\S)")
 _SET = re.compile(rb'\s*"([^"\n]*)"')
 _SPACE = re.compile(

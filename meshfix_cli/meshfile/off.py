@@ -31,7 +31,7 @@ from meshfix_cli.meshfile.tables import (
 from meshfix_cli.meshfile.text import Spans, in_line
 
 _COMMENT = re.compile(rb"#[^\n\r]*")
-_KEYWORD = re.compile(rb"(?:\xef\xbb\xbf)?\s*((?:ST)?C?N?4?n?OFF)(?![A-Za-z])[ \t]*(BINARY)?")
+_KEYWORD = re.compile(rb"\s*((?:ST)?C?N?4?n?OFF)(?![A-Za-z])[ \t]*(BINARY)?")
 _COUNTS = re.compile(rb"\s*(\d{1,18})[ \t]+(\d{1,18})(?:[ \t]+\d+)?[ \t]*(?=[\n\r]|\Z)")
 _TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
 

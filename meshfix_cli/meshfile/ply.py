@@ -23,6 +23,7 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Edits, InPlace, Places, apply, pairs
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 
+_BEGIN = re.compile(rb"(?:\xef\xbb\xbf)?ply[ \t]*(?=[\r\n])")
 _SECOND = re.compile(rb"ply[\r\n]+format ")  # one more header behind the rows of the first
 _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r|\Z)")
 _LINE = re.compile(rb"[^\r\n]+")
@@ -299,13 +300,14 @@ def promoted(data: bytes) -> bytes:
 
 
 def _header(data: bytes) -> _Header:
-    if not re.match(rb"ply[ \t]*[\r\n]", data):
+    begin = _BEGIN.match(data)
+    if begin is None:
         raise ReadError("is not a readable ply file: its first line is not 'ply'")
     end = _END.search(data)
     if end is None:
         raise ReadError("is truncated: its header does not end")
     order, elements, remarks = None, dict[str, _Element](), False
-    for line in _LINE.finditer(data, 3, end.start()):
+    for line in _LINE.finditer(data, begin.end(), end.start()):
         match line[0].split():
             case []:
                 pass

@@ -19,7 +19,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Arrays, Cells
 from meshfix_cli.meshfile.splice import Places
-from meshfix_cli.meshfile.text import Spans, in_line, integers_at, words
+from meshfix_cli.meshfile.text import Spans, in_line, integers_at, unmarked, words
 
 Int64 = NDArray[np.int64]
 
@@ -30,11 +30,14 @@ _MOST_RUNS = 1000  # above, cells of a kind are gathered from all over the file
 def without(data: bytes, pattern: re.Pattern[bytes], mark: bytes = b"") -> bytes:
     """Return the data with blanks in the place of what fits, comments say, so that all else stands where it stood.
 
+    The mark of UTF-8 is blank as well.
+
     Parameters
     ----------
     mark : bytes
         Where it is not in the data, nothing fits.
     """
+    data = unmarked(data)
     return pattern.sub(lambda found: b" " * len(found[0]), data) if mark in data else data
 
 

@@ -11,7 +11,13 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 
+MARK = b"\xef\xbb\xbf"  # of UTF-8, which some programs put in front of any text
 Spans = NDArray[np.int64]  # (..., 2): the offset of the first byte of a word, and the offset behind its last
+
+
+def unmarked(data: bytes) -> bytes:
+    """Return a text with a blank line, of as many bytes, in the place of the mark of UTF-8 in front of it."""
+    return b"  \r" + data[len(MARK) :] if data.startswith(MARK) else data
 
 
 def words(data: bytes, at: int, count: int, brackets: bool = False) -> Spans:
@@ -43,7 +49,7 @@ def line_words(data: bytes, offsets: ArrayLike, count: int) -> Spans:
 def first_words(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.bytes_]]:
     """Return the offset behind the first word of each line that has one, and the words, cut after nine bytes."""
     raw = np.frombuffer(data, dtype=np.uint8)
-    start = 3 if data.startswith(b"\xef\xbb\xbf") else 0  # the mark of UTF-8
+    start = len(MARK) if data.startswith(MARK) else 0
     lines = np.concatenate([[start], np.flatnonzero((raw == ord("\n")) | (raw == ord("\r"))) + 1])
     spans = line_words(data, lines, 1)[:, 0]
     begin, end = spans[spans[:, 0] >= 0].T

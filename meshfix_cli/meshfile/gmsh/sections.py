@@ -17,7 +17,7 @@ from meshfix_cli.meshfile.gmsh.cells import TYPES
 from meshfix_cli.meshfile.gmsh.numbers import Binary, Int64, Text
 from meshfix_cli.meshfile.splice import Places
 
-_SECTION = re.compile(rb"^\$(?!End|END)(\w{0,60})[^\n]*(?:\n|\Z)", re.MULTILINE)
+_SECTION = re.compile(rb"(?:^|\A\xef\xbb\xbf)\$(?!End|END)(\w{0,60})[^\n]*(?:\n|\Z)", re.MULTILINE)
 _END = re.compile(rb"\s*\$(?:End|END)(\w+)")
 _FORMAT = re.compile(rb"\s*(\d+(?:\.\d+)?)[ \t]+([01])[ \t]+(\d+)[^\n]*\n")
 _NAME = re.compile(rb'^\s*(\d)\s+(-?\d{1,18})\s+"([^\n]*)"', re.MULTILINE)

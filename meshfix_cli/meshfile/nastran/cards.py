@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.tables import Int64
-from meshfix_cli.meshfile.text import Spans, in_line, not_a_number
+from meshfix_cli.meshfile.text import Spans, in_line, not_a_number, unmarked
 
 BLANK = np.iinfo(np.int64).min  # an integer that is not there
 _OTHER = BLANK + 1  # something else is
@@ -101,9 +101,10 @@ class Deck:
     @classmethod
     def of(cls, data: bytes) -> Deck:
         """Find the cards; ReadError where there may be others elsewhere, or several meshes."""
-        names, *cards = kernels.find_cards(data)
+        text = unmarked(data)
+        names, *cards = kernels.find_cards(text)
         known = [name.tobytes().rstrip(b"\0").decode("latin-1") for name in names]
-        return cls(data, known, *cards)._bulk()
+        return cls(text, known, *cards)._bulk()
 
     def _bulk(self) -> Deck:
         """Return what stands between BEGIN BULK, or the beginning of the file, and ENDDATA."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,11 +53,17 @@ def _drawn_near(points: NDArray[np.float64], epsilon: float) -> tuple[NDArray[np
 
     Else one vertex would hide from the tolerance what the others form, and from the fit which plane they lie in.
     """
-    middle = points[np.argmin(np.linalg.norm(points - np.median(points, axis=0), axis=1))]
+    middle = points[np.argmin(np.linalg.norm(points - _median(points), axis=1))]
     distance = np.linalg.norm(points - middle, axis=1)
-    usual = float(np.median(distance))
+    usual = float(_median(distance))
     if not 0.0 < FAR * usual < distance.max():
         return points, epsilon
     scale = distance + usual
     rounding = epsilon * float((np.abs(points).max(axis=1) / scale).max())
     return (points - middle) / scale[:, None], rounding
+
+
+def _median(values: NDArray[np.float64]) -> Any:
+    """Return the upper median along the first axis: numpy's imports masked arrays, a tenth of a small mesh's time."""
+    middle = len(values) // 2
+    return np.partition(values, middle, axis=0)[middle]

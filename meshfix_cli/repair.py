@@ -107,7 +107,7 @@ class Files:
         self, document: Document, mesh: Mesh, output: Format, put: Put | None = None
     ) -> tuple[Mesh, tuple[str, ...]]:
         """Write a moved mesh; return it as the file holds it, and what the user should know."""
-        from meshfix_cli.meshfile.writing import unknown_extension, write
+        from meshfix_cli.meshfile.writing import other_format, unknown_extension, write
 
         if self.dry_run:
             return document.as_stored(mesh), ()
@@ -115,6 +115,10 @@ class Files:
         unknown = unknown_extension(document, self.target) if self.form is None else None
         if unknown is not None:
             notes = (f"{self.target}: the extension {unknown} is not known, so it is written as {output.reader}",)
+        other = other_format(document, self.target) if self.form is None else None
+        if other is not None:
+            written = f"it is written as {output.reader}, as the input is"
+            notes = (f"{self.target}: the extension is also that of {other}; {written}",)
         stored, dropped = write(document, mesh, self.target, output, self.backup, put)
         if document.is_kept_by(output) or document.is_as_read(stored, output):
             return stored, notes

@@ -85,7 +85,9 @@ def _by_number(source: Source, numbered: Mapping[str, Any]) -> Iterator[tuple[st
     names: dict[tuple[int, int], list[str]] = {}
     for name, (number, dimension) in numbered.items():
         names.setdefault((int(dimension), int(number)), []).append(name)
-    for run, labels in enumerate(source.arrays.cell.get(PHYSICAL, ())):
+    arrays = source.arrays.cell
+    numbering = next((name for name in (PHYSICAL, *source.regions) if name in arrays), None)
+    for run, labels in enumerate(arrays[numbering] if numbering else ()):
         numbers = np.abs(labels)  # the sign is an orientation
         order = np.argsort(numbers, kind="stable")
         values, first = np.unique(numbers[order], return_index=True)

@@ -29,7 +29,7 @@ _SAID = (
 _OF_CODE = re.compile(r"[`{}\[\]]|\w\(|np\.|\b[Ee]rror\b|https?:|__|\bNone\b")
 
 
-def plainly(error: BaseException, printed: str = "", otherwise: str = "it is not laid out as it should be") -> str:
+def plainly(error: BaseException, printed: str = "", otherwise: str = "") -> str:
     """Say in a sentence what is wrong with a file that a library raised an error about, or printed one and left.
 
     Parameters
@@ -38,14 +38,16 @@ def plainly(error: BaseException, printed: str = "", otherwise: str = "it is not
     printed : str
         What the library wrote to the terminal.
     otherwise : str
-        The sentence where what it says is for programmers.
+        The sentence about what could not be written, where what it says is about reading or for programmers.
     """
+    if isinstance(error, ImportError):
+        return f"that needs the package {error.name}"
     said = on_one_line(re.sub(r"Error:\s+Couldn't\s+read\s+file.*", "", printed, flags=re.DOTALL) or error)
+    if otherwise:
+        return said[:MOST].rstrip(".") if _is_for_people(error, said) else otherwise
     for pattern, words in _SAID:
         if found := re.search(pattern, said):
             return words.format(*found.groups())[:MOST]
-    if isinstance(error, ImportError):
-        return f"that needs the package {error.name}"
     if isinstance(error, OSError):
         return (
             "a file that it names is missing"
@@ -60,10 +62,10 @@ def plainly(error: BaseException, printed: str = "", otherwise: str = "it is not
         return TOO_EARLY
     if isinstance(error, KeyError) and len(error.args) == 1 and re.fullmatch(r"[\w .:-]+", str(error.args[0])):
         return f"{str(error.args[0])!r} in it is not known"
-    fit = _is_for_people(error) and said and not _OF_CODE.search(said)
-    return said[:MOST].rstrip(".") if fit else otherwise
+    return said[:MOST].rstrip(".") if _is_for_people(error, said) else "it is not laid out as it should be"
 
 
-def _is_for_people(error: BaseException) -> bool:
+def _is_for_people(error: BaseException, said: str) -> bool:
     """Whether what an error says was written for the user of a file: what meshio raises, or prints before it leaves."""
-    return isinstance(error, SystemExit) or type(error).__module__.startswith("meshio.")
+    theirs = isinstance(error, SystemExit) or type(error).__module__.startswith("meshio.")
+    return theirs and bool(said) and not _OF_CODE.search(said)

@@ -17,7 +17,7 @@ from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.splice import InPlace, Points, Turned
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.
-PHYSICAL = "gmsh:physical"  # whose numbers `Arrays.groups` names
+PHYSICAL = "gmsh:physical"
 REGIONS = (
     PHYSICAL, "gmsh:physical_set", "medit:ref", "cell_tags", "abaqus:section", "obj:material", "stl:solid",
     "nastran:ref", "avsucd:material", "exodus:block", "flac3d:group", "netgen:index", "tetgen:ref", "ugrid:ref",
@@ -71,7 +71,8 @@ class Arrays:
     cell : dict
         For each name an array (m, ...) for each run of cells.
     groups : dict
-        For each name of a group its number and dimension: meshio's `field_data`.
+        For each name of a group its number, in the cell data PHYSICAL or, where there are none, in those of regions,
+        and its dimension: meshio's `field_data`.
     point_sets : dict
         Rows of points for each name.
     cell_sets : dict

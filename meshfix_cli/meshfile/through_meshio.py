@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import gc
 import io
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from datetime import datetime
+from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import meshio
@@ -17,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.formats import Format
@@ -35,6 +39,14 @@ _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
 _PLAIN = {b"R3D3": b"CPS3", b"CAX4P": b"CPS4", b"C3D8RH": b"C3D8"}
 _TURNED = ("vtk", "vtu")
 _WITH_SETS = ("abaqus", "exodus")
+# Which module's clock a writer asks for a remark: with that the same mesh would not have the same bytes.
+_CLOCKS = {
+    "exodus": ("meshio.exodus._exodus", "datetime"),
+    "flac3d": ("meshio.flac3d._flac3d", "time"),
+    "h5m": ("meshio.h5m._h5m", "datetime"),
+}
+_NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
+_STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
 _ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
 
 
@@ -61,18 +73,45 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
     for types, arrays in attempts:
         kept = [i for i, run in enumerate(source.cells) if run.type in types and len(run.vertices)]
         try:
-            with _sentences(WriteError, f"cannot be written as {form.name}", path):
+            with (
+                _sentences(WriteError, f"cannot be written as {form.name}", path, _failing(types, points)),
+                _clock_stopped(form),
+            ):
                 meshio.write(path, _mesh(source, points, arrays, kept, form), form.name, **formats.options(form))
             break
         except WriteError as error:
-            last = error
+            last = str(error)
+        gc.collect()  # what failed holds on to a file that a writer left open
     else:
-        raise last
+        raise WriteError(last)
     if len(list(path.parent.iterdir())) > 1:
         raise WriteError(f"cannot be written as {form.name}: it takes more than one file")
     if form.name == "abaqus":
         names = rb"(?<=TYPE=)\w+(?=\n)"
         path.write_bytes(re.sub(names, lambda name: _PLAIN.get(name[0], name[0]), path.read_bytes()))
+
+
+@contextlib.contextmanager
+def _clock_stopped(form: Format) -> Iterator[None]:
+    """Let a writer find the same time whenever it is called."""
+    if form.name not in _CLOCKS:
+        yield
+        return
+    name, clock = _CLOCKS[form.name]
+    module = import_module(name)
+    real = getattr(module, clock)
+    setattr(module, clock, _STILL)
+    try:
+        yield
+    finally:
+        setattr(module, clock, real)
+
+
+def _failing(types: Iterable[str], points: NDArray[np.floating[Any]]) -> str:
+    """Say what a writer does not take that fails on no more than some types of cells."""
+    plural = " and ".join(sorted(words(key)[1] for key in types))
+    plane = max(map(dimension_of, types), default=0) < points.shape[1]
+    return f"meshio's writer fails on {plural}{' whose points have three coordinates' if plane else ''}"
 
 
 def _several_zones(path: Path) -> str | None:
@@ -171,7 +210,7 @@ def _source(mesh: Any, data: bytes, form: Format) -> Source:
 
 
 @contextlib.contextmanager
-def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None]:
+def _sentences(kind: type[MeshfixError], what: str, path: Path, otherwise: str = "") -> Iterator[None]:
     """Turn whatever meshio raises into one sentence; also its sys.exit, for which it prints the reason."""
     printed = io.StringIO()
     try:
@@ -193,8 +232,7 @@ def _sentences(kind: type[MeshfixError], what: str, path: Path) -> Iterator[None
         cause = error
     except Exception as error:
         cause = error
-    words = {} if kind is ReadError else {"otherwise": "it does not take all that is in the mesh"}
-    reason = plainly(cause, printed.getvalue() if isinstance(cause, SystemExit) else "", **words)
+    reason = plainly(cause, printed.getvalue() if isinstance(cause, SystemExit) else "", otherwise)
     raise kind(f"{what} ({reason.replace(str(path), 'it')})") from cause
 
 

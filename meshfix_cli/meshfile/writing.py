@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, WriteError
-from meshfix_cli.mesh.elements import words
+from meshfix_cli.mesh.elements import dimension_of, words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile import compressed, foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
@@ -243,6 +243,15 @@ def unknown_extension(document: Document, target: str) -> str | None:
     return extension
 
 
+def other_format(document: Document, target: str) -> str | None:
+    """Return the format for which an extension stands first, where the input's has another and keeps its format."""
+    extension, mine = (compressed.inner(Path(name)).suffix.lower() for name in (target, document.name))
+    other = formats.by_name(Path(target))
+    shared = other is not None and other.reader != document.format.reader
+    keeps = extension != mine and formats.may_be(document.format, Path(target))
+    return other.name if other is not None and shared and keeps else None
+
+
 def _writable(form: Format, target: str) -> Format:
     if form.name == "gmsh":  # meshio leaves out entities that own no node, and gmsh does not open that
         raise WriteError(f"{target}: files of gmsh 4.1 are written back, but not made of others; use --format gmsh22")
@@ -283,7 +292,8 @@ def _write_anew(
         found = [back.vertices_of(run.type, run.vertices.shape[1]) for run in runs]
         lacking = next((run for run, rows in zip(runs, found, strict=True) if not len(rows)), None)
         if lacking is not None:
-            raise WriteError(f"cannot be written as {form.name}: that holds no {words(lacking.type)[1]}")
+            where = " in space" if points.shape[1] == 3 and dimension_of(lacking.type) == 2 else ""
+            raise WriteError(f"cannot be written as {form.name}: that holds no {words(lacking.type)[1]}{where}")
         corners = _spatial(back.points)[np.concatenate([rows.ravel() for rows in found])]
         difference = np.abs(corners - _spatial(held)[expected]).max()
         dropped = source.lost_in(back)

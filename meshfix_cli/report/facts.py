@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, role, words
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.document import ON_BOUNDARY
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import BIN_WIDTH, JACOBIAN_BINS, Summary
@@ -389,9 +390,14 @@ def _impossible(report: Report) -> Iterator[str]:
     for pairs, what in ((found.crossing, "crosses itself"), (found.folding, "folds back upon itself")):
         if count := len(pairs):
             places = counted(count, "place", "places")
-            yield f"IMPOSSIBLE: the fixed boundary {what} in {places} ({_some_pairs(report, pairs)})"
+            yield f"IMPOSSIBLE: {what_is_fixed(report.fixed)} {what} in {places} ({_some_pairs(report, pairs)})"
     if len(found.overlapping):
         yield f"IMPOSSIBLE: separate parts of the mesh overlap ({_some(report, found.overlapping)})"
+
+
+def what_is_fixed(fixed: Mapping[str, int]) -> str:
+    """Return what may cross itself, by the reasons for which vertices are fixed."""
+    return "the fixed boundary" if set(fixed) <= {ON_BOUNDARY} else "what held vertices span"
 
 
 def _some(report: Report, rows: NDArray[np.integer[Any]]) -> str:
@@ -468,6 +474,8 @@ def _displaced(facts: Mapping[str, Any]) -> str:
 
 
 def _perturbed(facts: Mapping[str, Any]) -> str:
+    if not facts["moved"]:
+        return "moved no vertex"
     moved = counted(facts["moved"], "vertex", "vertices")
     return f"moved {moved} by {facts['distance']:.6g} (seed {facts['seed']})"
 

@@ -30,6 +30,7 @@ from meshfix_cli.report.facts import (
     sliding,
     title,
     verdict,
+    what_is_fixed,
 )
 from meshfix_cli.report.plain import plain
 
@@ -164,9 +165,9 @@ def _result_line(result: Mapping[str, Any]) -> str:
     if result["misnumbered"]:
         parts.append(f"{result['misnumbered']:,} numbered against the rest of the mesh")
     if result["obstacles"]["crossing"]:
-        parts.append("the fixed boundary crosses itself")
+        parts.append(f"{what_is_fixed(result['fixed'])} crosses itself")
     if result["obstacles"]["folding"]:
-        parts.append("the fixed boundary folds back upon itself")
+        parts.append(f"{what_is_fixed(result['fixed'])} folds back upon itself")
     if result["obstacles"]["overlapping"]:
         parts.append("separate parts overlap")
     parts += [f"{counted(count, *words(key))} not judged" for key, count in result["not_judged"].items()]

@@ -201,6 +201,11 @@ def test_an_unknown_extension_of_the_output_is_told(tmp_path: Path) -> None:
     assert notes("perturb", "--percent", 9, "--dist", "h", odd, tmp_path / "b.abc.gz") == [
         f"{tmp_path / 'b.abc.gz'}: the extension .abc is not known, so it is written as vtk"
     ]
+    ucd, shared = tmp_path / "c.ucd", tmp_path / "c.inp"
+    assert notes("untangle", TANGLED, ucd) == []
+    told = "the extension is also that of abaqus; it is written as avsucd, as the input is"
+    assert notes("untangle", ucd, shared) == [f"{shared}: {told}"]
+    assert notes("untangle", shared, tmp_path / "d.inp") == notes("untangle", ucd, shared, "--format", "abaqus") == []
     for target in (odd, tmp_path / "c.xyz", tmp_path / "c.vtu", tmp_path / "c"):
         assert notes("untangle", odd, target) == []
     assert notes("untangle", "--format", "obj", TANGLED, tmp_path / "d.foo") == []

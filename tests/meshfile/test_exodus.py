@@ -16,6 +16,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile import exodus, netcdf
 from meshfix_cli.meshfile.exodus.types import key_of
+from meshfix_cli.meshfile.groups import groups_of
 from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
@@ -234,7 +235,9 @@ def test_sets_by_name_and_number(tmp_path: Path) -> None:
     assert {name: rows.tolist() for name, rows in sets.items()} == {
         "fixed": [0, 4, 5], "nodelist_5": [1], "surface_9": expected.tolist(),
     }  # fmt: skip
-    assert source.arrays.groups == {"steel": [10, 3]}
+    assert source.arrays.groups == {"steel": [10, 3], "block_11": [11, 3]}
+    blocks = [[np.unique(run.vertices).tolist()] for run in source.cells]
+    assert [[groups_of(source)[name].points.tolist()] for name in ("steel", "block_11")] == blocks
 
 
 def test_sets_of_one_name_are_one(tmp_path: Path) -> None:

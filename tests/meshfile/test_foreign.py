@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 from commands import error_line, run
+from places import SAMPLES
 from shapes import block, plate
 
 from meshfix_cli import read, untangle, write
@@ -125,7 +127,28 @@ def test_words_of_libraries_do_not_reach_the_user(tmp_path: Path) -> None:
     quads = [("triangle", cells), ("quad", np.array([[0, 1, 2, 3]]))]
     meshio.Mesh(points, quads).write(tmp_path / "in.vtk")
     line = error_line("untangle", tmp_path / "in.vtk", tmp_path / "o.su2")
-    assert line.endswith("cannot be written as su2 (it does not take all that is in the mesh)")
+    assert line.endswith("(meshio's writer fails on quadrilaterals and triangles whose points have three coordinates)")
+
+
+def test_a_writer_that_left_a_file_open_is_tried_again(tmp_path: Path) -> None:
+    """That of h5m fails on cell data."""
+    points, cells = block()
+    meshio.Mesh(points, [("tetra", cells)], cell_data={"a": [cells[:, 0]]}).write(tmp_path / "in.vtk")
+    document = read(tmp_path / "in.vtk")
+    assert write(document, document.mesh, tmp_path / "out.h5m")[1] == ("cell data a",)
+    assert read(tmp_path / "out.h5m").mesh.check() == document.mesh.check()
+
+
+@pytest.mark.parametrize("suffix", [".e", ".f3grid", ".cgns", ".med", ".h5m", ".hmf", ".vtu", ".xdmf"])
+def test_a_mesh_that_is_written_anew_has_the_same_bytes(
+    suffix: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    document = read(SAMPLES / "two_materials.msh")
+    mesh = untangle(document.mesh).after
+    for name in ("a", "b"):
+        write(document, mesh, tmp_path / f"{name}{suffix}")
+        monkeypatch.setattr(time, "ctime", lambda: "another day")
+    assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes()
 
 
 def test_what_cannot_be_written_is_told_before_the_work(tmp_path: Path) -> None:

@@ -140,9 +140,9 @@ def tetgen(folder: Path) -> str:
     return "in.node"
 
 
-def openfoam(folder: Path, **options: bool) -> str:
+def openfoam(folder: Path, binary: bool = False) -> str:
     points, cells = block()
-    files_openfoam.write(folder, points, [("tetra", cells)], **options)
+    files_openfoam.write(folder, points, [("tetra", cells)], binary=binary)
     return "."
 
 

@@ -80,6 +80,12 @@ def test_what_was_said_to_people_is_kept() -> None:
     assert plainly(SystemExit(1), "got np.int64(3)") == "it is not laid out as it should be"
 
 
+def test_what_cannot_be_written_is_not_called_damaged() -> None:
+    for error in (OSError("unable to truncate a file"), IndexError("list index out of range"), TypeError("np.int64")):
+        assert plainly(error, otherwise="it does not take this") == "it does not take this"
+    assert plainly(SystemExit(1), "Can only write triangles", "it does not take this") == "Can only write triangles"
+
+
 def test_dolfin_has_as_many_cells_as_it_announces(tmp_path: Path) -> None:
     path = tmp_path / "through.xml"
     write(plate(np.random.default_rng(1)), path)

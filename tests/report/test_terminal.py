@@ -14,6 +14,8 @@ from commands import TANGLED, on_terminal, run
 from files_pvtu import split
 from places import SAMPLES
 
+from meshfix_cli.report.facts import what_is_fixed
+
 ANSI = re.compile(r"\x1b\[[\d;?]*[A-Za-z]")
 # One of something that is called as several are.
 WRONG = re.compile(r"(?<![\d.,])1 (?!(is|was|has) )(\w+s|vertices|tetrahedra|polyhedra|\w+ are)\b")
@@ -21,6 +23,18 @@ WRONG = re.compile(r"(?<![\d.,])1 (?!(is|was|has) )(\w+s|vertices|tetrahedra|pol
 
 def lines_of(shown: str) -> list[str]:
     return [line.rstrip() for line in ANSI.sub("", shown).replace("\r", "\n").split("\n")]
+
+
+def test_a_mesh_without_a_free_vertex_is_not_moved_by_a_length(tmp_path: Path) -> None:
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    meshio.Mesh(points, [("triangle", np.array([[0, 1, 2]]))]).write(tmp_path / "in.vtk")
+    shown = run("perturb", "--percent", 25, "--dist", "2h", tmp_path / "in.vtk", tmp_path / "o.vtk").stdout.decode()
+    assert "\nmoved no vertex\n" in shown
+
+
+def test_what_crosses_itself_is_called_what_it_is() -> None:
+    assert what_is_fixed({"on the boundary": 7}) == "the fixed boundary"
+    assert what_is_fixed({"on the boundary": 7, "held by --fix pin": 2}) == "what held vertices span"
 
 
 @pytest.mark.parametrize("columns", [20, 40, 60, 80, 100])

@@ -36,12 +36,13 @@ def arrays(variables: Named, found: Sequence[Block], points: int, dimension: int
 
 
 def _groups(variables: Named, found: Sequence[Block], dimension: int) -> Iterator[tuple[str, list[int]]]:
-    """Names of blocks, each with the number of the block and the dimension of its elements."""
+    """Names of blocks, if need be of their numbers, each with that and the dimension of its elements."""
     named = titles(variables, "eb_names")
     for block in found:
         at = int(re.sub(r"\D", "", block.table)) - 1
-        if at < len(named) and named[at] and block.runs:
-            yield named[at], [block.number, dimension_of(block.runs[0].type)]
+        if block.runs:
+            name = named[at] if at < len(named) else ""
+            yield name or f"block_{block.number}", [block.number, dimension_of(block.runs[0].type)]
 
 
 def _sets(variables: Named, kind: str, table: str, default: str) -> Iterator[tuple[str, str]]:

@@ -96,11 +96,11 @@ def _renamed(old: Sequence[str], contents: list[bytes], names: Sequence[str]) ->
 
 
 def promoted(data: bytes) -> bytes:
-    """Return the file with coordinates in double precision, where they are text in it."""
+    """Return a file of single precision with coordinates in double precision, where they are text in it."""
     tree = Tree(data)
     items = [item for grid in tree.grids() for item in geometry_of(tree, grid.geometry).items]
     single = {item.element.at: item for item in items if item.dtype.str[1:] == "f4"}
-    if any(item.file for item in single.values()):
+    if not single or any(item.file for item in single.values()):  # what is said of a data set may not be what it is
         raise ReadError("has coordinates of single precision in a file beside it, which cannot be double")
     file = XmlFile(data, tree.root, (), False, 0, 0)
     return file.edited([file.attribute(item.element, "Precision", "8") for item in single.values()])

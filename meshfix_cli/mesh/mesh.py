@@ -22,6 +22,7 @@ _T = TypeVar("_T", bound=np.generic)
 # Squares and sixth powers of lengths must neither overflow nor vanish in double precision.
 LARGEST_COORDINATE = 1e45
 SMALLEST_SIZE = 1e-45
+ON_BOUNDARY = "on the boundary"  # why a vertex is fixed, where nobody asked for it
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
 from meshfix_cli.mesh.elements import counted, dimension_of
-from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, Mesh
+from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.formats import DRAWINGS, Format
@@ -24,7 +24,7 @@ from meshfix_cli.meshfile.splice import Turned
 
 FREE = "none"  # the name of no array of regions, by which interfaces are freed
 # Reasons to hold vertices that may slide all the same, where they are asked to.
-ON_BOUNDARY, BETWEEN, ON_CELLS = "on the boundary", "between regions of", "on other cells of the file"
+BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of
 from meshfix_cli.mesh.freedom import constraints_of, freedom_of
+from meshfix_cli.mesh.mesh import ON_BOUNDARY
 from meshfix_cli.meshfile.coincident import first_of_each_place
-from meshfix_cli.meshfile.document import BETWEEN, ON_BOUNDARY, ON_CELLS, Document
+from meshfix_cli.meshfile.document import BETWEEN, ON_CELLS, Document
 
 Int64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]

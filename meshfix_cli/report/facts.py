@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, role, words
-from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile.document import ON_BOUNDARY
+from meshfix_cli.mesh.mesh import ON_BOUNDARY, Mesh
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import BIN_WIDTH, JACOBIAN_BINS, Summary

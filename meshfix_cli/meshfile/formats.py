@@ -198,6 +198,11 @@ def _avsucd(_: bytes, text: str) -> Format | None:
     return Format("avsucd") if _UCD.match(text) else None
 
 
+def _unv(_: bytes, text: str) -> Format | None:
+    """Recognise the beginning of a data set."""
+    return Format("unv") if re.match(r"-1[ \t]*[\r\n]\s*\d{2,4}[ \t]*[\r\n]", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -301,6 +306,11 @@ OWN = {
     "dolfin-xml": Own(
         "dolfin", _dolfin, {".xml": "dolfin-xml"}, "DOLFIN",
         "meshes of all types of cells; functions and values of the mesh, in it or beside it, stay", "values of cells",
+    ),
+    "unv": Own(
+        "unv", _unv, {".unv": "unv"}, "I-deas",
+        "universal files, with points and elements in their newer data sets; points in one rectangular system",
+        "properties, materials, and what is in the same groups; groups of points and elements",
     ),
 }  # fmt: skip
 

@@ -188,6 +188,17 @@ def within(text: bytes, begin: int, end: int) -> Spans:
     return kernels.find_words(text[begin:end], 0, max(end - begin, 0)) + begin
 
 
+def in_columns(text: bytes, spans: Spans, width: int) -> Spans | None:
+    """Return the spans (..., 2) of fields of so many columns at whose right ends words stand; None: not all do so."""
+    begin, raw = spans[..., 1] - width, np.frombuffer(text, dtype=np.uint8)
+    if not spans.size or begin.min() < 0 or (begin > spans[..., 0]).any():
+        return None
+    for i in range(width):
+        if (raw[begin + i][begin + i < spans[..., 0]] != ord(" ")).any():
+            return None
+    return np.stack([begin, spans[..., 1]], axis=-1)
+
+
 class Numbering:
     """The numbers that a file gives to its points or cells, in the order of their rows.
 

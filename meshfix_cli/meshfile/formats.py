@@ -312,7 +312,17 @@ OWN = {
         "universal files, with points and elements in their newer data sets; points in one rectangular system",
         "properties, materials, and what is in the same groups; groups of points and elements",
     ),
+    "elmer": Own(
+        "elmer", _by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
+        "a folder with `mesh.header`, or one of its files; cells of second order are held; not what is partitioned",
+        "bodies; elements of the boundary; their names in `mesh.names`", beside=True,
+    ),
 }  # fmt: skip
+
+
+def of_folder(path: Path) -> Format:
+    """Return the format of a mesh that is a folder, or of what stands for one."""
+    return Format("elmer" if (path / "mesh.header").is_file() else "openfoam")
 
 
 def sniff(data: bytes) -> Format | None:

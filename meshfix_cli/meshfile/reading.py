@@ -86,6 +86,9 @@ def read(
         return document
 
 
+_OTHERS = {".node": ".ele", ".ele": ".node", ".header": ".nodes", ".nodes": ".header", ".elements": ".header"}
+
+
 def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
     """Return where the files are that a `.pvtu`, a `.foam` or one of two files stands for, and those of an output.
 
@@ -95,8 +98,7 @@ def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
     if suffix == ".foam":
         points = Path("constant", "polyMesh", "points")
         return [str(here.parent / points)], [str(there.parent / points)]
-    if suffix in (".node", ".ele"):
-        other = ".ele" if suffix == ".node" else ".node"
+    if other := _OTHERS.get(suffix):
         return [str(here.with_suffix(other))], [str(there.with_suffix(other))]
     if suffix != ".pvtu":
         return [], []
@@ -122,7 +124,11 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
     packed = data if is_compressed(data) else None
     if packed is not None:
         data = _not_empty(unpacked(packed))
-    form = Format("openfoam") if folder else _format(data, Path() if path is None else inner(path), name)
+    form = (
+        formats.of_folder(path)
+        if folder and path is not None
+        else _format(data, Path() if path is None else inner(path), name)
+    )
     if form is None:
         raise ReadError("the format is not recognised")
     # A pipe can be read only once, and nobody but this package looks into what is compressed.

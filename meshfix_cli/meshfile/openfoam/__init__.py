@@ -37,7 +37,9 @@ def folder_of(path: Path) -> Path:
     for folder in (base / "constant" / "polyMesh", base / "polyMesh", base):
         if _file(folder, "points") and _file(folder, "faces"):
             return folder
-    raise ReadError("holds no mesh that is read as a folder: there is no constant/polyMesh of OpenFOAM in it")
+    raise ReadError(
+        "holds no mesh that is read as a folder: there is no constant/polyMesh of OpenFOAM, no mesh.header of Elmer"
+    )
 
 
 def parse(_: bytes, path: Path | None) -> Source:

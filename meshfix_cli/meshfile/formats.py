@@ -203,6 +203,12 @@ def _unv(_: bytes, text: str) -> Format | None:
     return Format("unv") if re.match(r"-1[ \t]*[\r\n]\s*\d{2,4}[ \t]*[\r\n]", text) else None
 
 
+def _tecplot(data: bytes, text: str) -> Format | None:
+    first = re.match(r"(?i)(?:#[^\n]*\n\s*)*(?:TITLE|VARIABLES|FILETYPE)\s*=", text)
+    named = first and re.search(r"(?im)^[ \t]*VARIABLES\s*=", text)
+    return Format("tecplot") if named or data.startswith(b"#!TD") else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -312,6 +318,11 @@ OWN = {
         "universal files, with points and elements in their newer data sets; points in one rectangular system",
         "properties, materials, and what is in the same groups; groups of points and elements",
     ),
+    "tecplot": Own(
+        "tecplot", _tecplot, dict.fromkeys((".tec", ".plt", ".tecplot"), "tecplot"), "Tecplot",
+        "text, by points and by variables; zones of elements and of points in order, each a part of its own; no "
+        "polygons or polyhedra", "zones",
+    ),
     "elmer": Own(
         "elmer", _by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
         "a folder with `mesh.header`, or one of its files; cells of second order are held; not what is partitioned",
@@ -375,4 +386,4 @@ def readers() -> tuple[str, ...]:
     """Names of the formats that can be read."""
     import meshio
 
-    return tuple(sorted({*OWN, *meshio._helpers.reader_map} - set(ENDLESS)))
+    return tuple(sorted({*OWN, *(set(meshio._helpers.reader_map) - set(ENDLESS))}))

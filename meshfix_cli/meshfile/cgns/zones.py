@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import hdf5
+from meshfix_cli.meshfile.blocks import BLOCK, cells_of_block
 from meshfix_cli.meshfile.cgns.types import MIXED, ORDER, Int64, runs, type_of
 from meshfix_cli.meshfile.hdf5 import Table
 
 AXES = ("CoordinateX", "CoordinateY", "CoordinateZ")
 _DATA = " data"
-_BLOCK = {1: "line", 2: "quad", 3: "hexahedron"}  # the cells of a block of points, by the number of indices
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,17 +151,11 @@ def _coordinates(name: str, grid: Any, shape: tuple[int, ...]) -> list[str]:
 
 
 def _block(shape: tuple[int, ...]) -> list[Run]:
-    """Return the cells between the points of a block, the first index fastest."""
-    if len(shape) not in _BLOCK:
+    """Return the cells between the points of a block."""
+    if len(shape) not in BLOCK:
         raise ReadError(f"is not a readable cgns file: a zone has {len(shape)} indices")
-    steps = np.cumprod([1, *shape[:-1]])
-    first = np.zeros(1, dtype=np.int64)
-    for step, size in zip(steps.tolist(), shape, strict=True):
-        first = (np.arange(max(size - 1, 0))[:, None] * step + first).ravel()
-    corners = np.zeros(1, dtype=np.int64)
-    for axis, step in enumerate(steps.tolist()):
-        corners = np.concatenate([corners, (corners[::-1] if axis == 1 else corners) + step])
-    return [Run(_BLOCK[len(shape)], "", first[:, None] + corners, np.arange(1, len(first) + 1), None)]
+    key, vertices = cells_of_block(shape)
+    return [Run(key, "", vertices, np.arange(1, len(vertices) + 1), None)]
 
 
 def _sections(group: Any, points: int) -> Iterator[Run]:

@@ -209,6 +209,13 @@ def _tecplot(data: bytes, text: str) -> Format | None:
     return Format("tecplot") if named or data.startswith(b"#!TD") else None
 
 
+def _comsol(_: bytes, text: str) -> Format | None:
+    """Recognise the version of the file, and what its objects are."""
+    head = re.match(r"(?:#[^\n]*\n\s*)*0[ \t]+1\s", text)
+    made = text.startswith("# Created by COMSOL") or re.search(r"(?m)^\s*4 Mesh\b", text)
+    return Format("comsol") if head and made else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -322,6 +329,10 @@ OWN = {
         "tecplot", _tecplot, dict.fromkeys((".tec", ".plt", ".tecplot"), "tecplot"), "Tecplot",
         "text, by points and by variables; zones of elements and of points in order, each a part of its own; no "
         "polygons or polyhedra", "zones",
+    ),
+    "comsol": Own(
+        "comsol", _comsol, {".mphtxt": "comsol"}, "Comsol",
+        "text, with one mesh; cells of second order are held", "entities; those of the boundary, and selections",
     ),
     "elmer": Own(
         "elmer", _by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",

@@ -1,6 +1,6 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
-Source: FreeFEM documentation, "Mesh generation"; "LS-DYNA Keyword User's Manual"; GetFEM user documentation, "Build a
+Source: FreeFEM documentation, "Mesh generation"; GetFEM user documentation, "Build a
 mesh".
 """
 
@@ -19,7 +19,6 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
 _FOREIGN = (
     ("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),
     ("Ansys Fluent", r"\(\s*\d+\s+[\"(\d]", ""),
-    ("LS-DYNA", r"(?:\$[^\n]*\n\s*)*\*(?:KEYWORD|NODE[\s_%](?s:.*)\*ELEMENT_|PART\s|ELEMENT_)", ""),
     ("exotxt", r"! Database Title", ""),
     ("MOVIE.BYU", r"\d+ +\d+ +\d+ +\d+\s*\n\s*\d+ +\d+", ".g"),
     ("FreeFEM", rf"\d+ +\d+ +\d+\s*\n\s*(?:{_NUMBER}\s+){{2,3}}\d+\s*\n", ".msh"),

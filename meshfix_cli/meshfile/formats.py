@@ -66,6 +66,14 @@ class Own:
     beside: bool = False
 
 
+_DYNA = re.compile(r"(?:\$[^\n]*\n\s*)*\*(?:KEYWORD|NODE[\s_%+-](?s:.*)\*ELEMENT_|PART\s|ELEMENT_)")
+
+
+def _lsdyna(_: bytes, text: str) -> Format | None:
+    """Recognise keywords that Abaqus, which has * as well, has not."""
+    return Format("lsdyna") if _DYNA.match(text.replace("\r", "\n")) else None
+
+
 def _abaqus(_: bytes, text: str) -> Format | None:
     if text.startswith("* FLAC3D"):
         return None
@@ -249,6 +257,11 @@ OWN = {
     "medit": Own(
         "medit", _medit, {".mesh": "medit"}, "MEDIT",
         "text; required vertices and edges, and corners, are held", "references",
+    ),
+    "lsdyna": Own(
+        "lsdyna", _lsdyna, dict.fromkeys((".k", ".key", ".dyn"), "lsdyna"), "LS-DYNA",
+        "cards in columns of 8, 10 and 20 and between commas; degenerate solids are what they are; no file that it "
+        "includes", "parts; these by their titles, and sets of nodes, elements and parts",
     ),
     "abaqus": Own(
         "abaqus", _abaqus, {".inp": "abaqus"}, "Abaqus",

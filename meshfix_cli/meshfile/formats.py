@@ -224,6 +224,10 @@ def _comsol(_: bytes, text: str) -> Format | None:
     return Format("comsol") if head and made else None
 
 
+def _gambit(_: bytes, text: str) -> Format | None:
+    return Format("gambit") if text.startswith("CONTROL INFO") else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -346,6 +350,10 @@ OWN = {
     "comsol": Own(
         "comsol", _comsol, {".mphtxt": "comsol"}, "Comsol",
         "text, with one mesh; cells of second order are held", "entities; those of the boundary, and selections",
+    ),
+    "gambit": Own(
+        "gambit", _gambit, {".neu": "gambit"}, "Gambit",
+        "neutral files; cells of second order are held", "groups; boundary conditions, whose faces are held",
     ),
     "elmer": Own(
         "elmer", _by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",

@@ -199,6 +199,18 @@ def in_columns(text: bytes, spans: Spans, width: int) -> Spans | None:
     return np.stack([begin, spans[..., 1]], axis=-1)
 
 
+def right_aligned(text: bytes, spans: Spans) -> Places:
+    """Return the places of coordinates (n, d, 2), which are fields of one width where all of them stand so.
+
+    A blank is left in front of each, and an exponent may stand behind a D.
+    """
+    width = int(spans[0, 1, 1] - spans[0, 0, 1]) - 1 if spans.size else 0
+    columns = in_columns(text, spans, width)
+    if columns is None:
+        return Places.of_text(spans, "f8", 25, "free")
+    return Places.of_text(columns, "f8", width, "padded")
+
+
 class Numbering:
     """The numbers that a file gives to its points or cells, in the order of their rows.
 

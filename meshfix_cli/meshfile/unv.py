@@ -20,7 +20,7 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, alike, in_columns, within
+from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, alike, in_columns, right_aligned, within
 from meshfix_cli.meshfile.text import in_line, integers, integers_at
 
 _EDGE = re.compile(rb"-1[ \t]*(?=[\n\r]|\Z)")  # where nothing stands before it in its line
@@ -67,7 +67,7 @@ def parse(data: bytes) -> Source:
         raise ReadError("is truncated or not readable: it has no data set of points (2411)")
     spans = np.concatenate(tables)
     _check_systems(data, sets, spans)
-    points, coordinates, runs = Numbering(integers_at(data, spans[:, 0])), _coordinates(data, spans[:, 4:]), Runs()
+    points, coordinates, runs = Numbering(integers_at(data, spans[:, 0])), right_aligned(data, spans[:, 4:]), Runs()
     for one in sets:
         if one.number in _OTHERS:
             raise ReadError(f"has elements in the data set {one.number}, which is not read")
@@ -106,15 +106,6 @@ def _points(data: bytes, one: _DataSet) -> Int64:
     if len(spans) % 7:
         raise in_line(data, one.begin, "there are not 7 numbers for each point of the data set")
     return spans.reshape(-1, 7, 2)
-
-
-def _coordinates(data: bytes, spans: Int64) -> Places:
-    """Find the columns of coordinates, whose exponents may stand behind a D, or what is not in columns."""
-    width = int(spans[0, 1, 1] - spans[0, 0, 1]) - 1 if len(spans) else 0  # a blank is left in front
-    columns = in_columns(data, spans, width)
-    return (
-        Places.of_text(spans, "f8", 25, "free") if columns is None else Places.of_text(columns, "f8", width, "padded")
-    )
 
 
 def _check_systems(data: bytes, sets: Sequence[_DataSet], points: Int64) -> None:

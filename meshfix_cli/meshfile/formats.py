@@ -228,6 +228,11 @@ def _gambit(_: bytes, text: str) -> Format | None:
     return Format("gambit") if text.startswith("CONTROL INFO") else None
 
 
+def _fluent(_: bytes, text: str) -> Format | None:
+    """Recognise the first section by its number."""
+    return Format("fluent") if re.match(r"\(\s*\d+\s+[\"'(\d]", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))
 
@@ -354,6 +359,10 @@ OWN = {
     "gambit": Own(
         "gambit", _gambit, {".neu": "gambit"}, "Gambit",
         "neutral files; cells of second order are held", "groups; boundary conditions, whose faces are held",
+    ),
+    "fluent": Own(
+        "fluent", _fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",
+        "text and binary; other polyhedra and polygons are held", "zones of cells and of faces",
     ),
     "elmer": Own(
         "elmer", _by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",

@@ -142,6 +142,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners), runs.arrays,
         (_ZONE,) * several, untold=untold, apart=len(own) > 1,
+        oriented=all(zone.kind[0] for zone in zones),  # in blocks the indices may run either way
     )  # fmt: skip
 
 

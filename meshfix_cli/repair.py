@@ -28,12 +28,16 @@ if TYPE_CHECKING:
     from meshfix_cli.meshfile.writing import Put
     from meshfix_cli.quality.obstacles import Obstacles
     from meshfix_cli.quality.requirement import Requirement
+    from meshfix_cli.quality.summary import Summary
     from meshfix_cli.report.facts import Report
     from meshfix_cli.solve.records import Outcome, SweepRecord
     from meshfix_cli.solve.team import Team
 
     Mask = NDArray[np.bool_]
     Steps = Iterator[tuple[Mesh, SweepRecord]]
+
+
+NEAR_CEILING = 0.9  # of it: from there on it is what limits the smallest angle or scaled Jacobian
 
 
 @dataclass(frozen=True)
@@ -251,8 +255,7 @@ class Judge:
         metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
         summaries = {stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown}
         if not (self.brief or command == "perturb"):
-            valid = summaries[shown[-1]].inverted == 0
-            more["facts"] = {**(more.get("facts") or {}), **self._sliding(document, result, most, valid)}
+            more["facts"] = {**(more.get("facts") or {}), **self._sliding(document, result, summaries[shown[-1]], most)}
         return Report(
             name=document.name,
             command=command,
@@ -269,16 +272,17 @@ class Judge:
             **more,
         )
 
-    def _sliding(self, document: Document, result: Mesh, most: float | None, valid: bool) -> dict[str, Any]:
-        """Return how many vertices slide or, where none may, what might be gained: a ceiling above this one."""
-        from meshfix_cli.meshfile.sliding import slid
-        from meshfix_cli.quality.summary import ceiling
-
+    def _sliding(self, document: Document, result: Mesh, summary: Summary, most: float | None) -> dict[str, Any]:
+        """Return how many vertices slide or, where none may and a ceiling limits the mesh, what might be gained."""
         if result.freedom is not None:
             moving = result.freedom.degrees[result.along_curve(result.movable)]
             return {"sliding": {"lines": int((moving == 1).sum()), "planes": int((moving == 2).sum())}}
-        if most is None:
+        valid = summary.inverted == 0
+        if most is None or (valid and summary.smallest < NEAR_CEILING * most):
             return {}
+        from meshfix_cli.meshfile.sliding import slid
+        from meshfix_cli.quality.summary import ceiling
+
         sliding = slid(replace(document, mesh=result), tangled=not valid).mesh
         after = ceiling(sliding, self.threads)
         if after is not None and not after > most:

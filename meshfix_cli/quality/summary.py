@@ -88,6 +88,11 @@ class Summary:
     jacobians: Jacobians | None = None
     kinds: tuple[Kind, ...] = ()
 
+    @property
+    def smallest(self) -> float:
+        """The smallest angle or, where elements are not all simplices, the smallest scaled Jacobian."""
+        return self.min_angle if self.jacobians is None else self.jacobians.smallest
+
 
 def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, reference: Array | None = None) -> Summary:
     """Evaluate a mesh.

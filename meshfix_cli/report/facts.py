@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
 Row = tuple[str, list[str]]  # of a table: a label, and a value for each column
 LISTED = 10  # inverted elements named in the report
-NEAR_CEILING = 0.9  # of it: from there on it is what limits the smallest angle or scaled Jacobian
 
 # By command, the words between the number of elements that are inverted and "inverted"; of others they "are".
 _BEFORE_INVERTED = {
@@ -232,12 +231,9 @@ def _sliding(report: Report) -> str:
 
 
 def sliding(report: Report) -> Iterator[str]:
-    """Say what would be gained if the flat boundary might slide, where fixed vertices are what limits the mesh."""
-    gain, best = (report.facts or {}).get("slide_flat"), report.result
-    if gain is None or report.ceiling is None:
-        return
-    smallest = best.min_angle if best.jacobians is None else best.jacobians.smallest
-    if report.valid and smallest < NEAR_CEILING * report.ceiling:
+    """Say what would be gained if the flat boundary might slide."""
+    gain = (report.facts or {}).get("slide_flat")
+    if gain is None:
         return
     could = f"{gain['free_vertices']:,} instead of {int(report.mesh.movable.sum()):,} vertices could move"
     unit = "°" if report.mesh.topology.simplicial else ""

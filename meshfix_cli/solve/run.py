@@ -129,6 +129,8 @@ class Run:
         """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
         if phase.elements is self.mendable.simplicial or (phase.layers and not self.mendable.simplicial):
             return False
+        if phase.slides and self.freedom is None:
+            return False
         if phase.smooths:
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
                 return False
@@ -142,7 +144,7 @@ class Run:
         near = self._grown(self.broken, phase.rings[0] or 0) if phase.rings else self.free
         if phase.rings and 2 * self._count(near) > self._count(self.free):
             return False
-        self.near = near
+        self.near = near & self.inside if phase.slides is False else near
         return True
 
     def _asks_for_another_start(self) -> bool:

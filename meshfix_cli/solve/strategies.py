@@ -85,6 +85,9 @@ class Phase:
         The function is that of `layers.py`, which makes up a reference.
     elements : bool or None
         For meshes of other elements than simplices alone; False: of simplices alone; None: of any.
+    slides : bool or None
+        False: vertices of the boundary stay, whether or not they may slide: a boundary that is not tangled loses by it.
+        True: for meshes in which some may; None: for any, and they do.
     compares : bool
         Where elements are not all simplices, the last mesh is the best one of those after such phases, of which no
         figure is below those after the first.
@@ -102,6 +105,7 @@ class Phase:
     to_reference: Literal["", "follow", "mend", "approach"] = ""
     layers: bool = False
     elements: bool | None = None
+    slides: bool | None = None
     compares: bool = False
 
     @property
@@ -124,18 +128,23 @@ _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from
 _FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
 
 
-def _starts(rings: tuple[int, ...] = ()) -> tuple[Phase, ...]:
+def _starts(rings: tuple[int, ...] = (), slides: bool = False) -> tuple[Phase, ...]:
     """Give the phases of both starts, Laplacian sweeps and the embedding, in a region."""
     again = tuple(replace(phase, from_best=False) for phase in (_LP_INVALID, _LP_COEFFICIENTS))
-    phases = (_STALLING, _LP_INVALID, _LP_COEFFICIENTS, _EMBEDDING, *again)
-    near = " near inverted elements" * bool(rings)
-    return tuple(replace(phase, name=phase.name + near, rings=rings) for phase in phases)
+    starts = tuple(replace(phase, slides=slides) for phase in (_STALLING, _EMBEDDING))
+    phases = (starts[0], _LP_INVALID, _LP_COEFFICIENTS, starts[1], *again)
+    if slides:
+        first, *others = (replace(phase, slides=True) for phase in phases)
+        phases = (replace(first, from_best=True), *others)
+    where = " near inverted elements" * bool(rings) + ", sliding" * slides
+    return tuple(replace(phase, name=phase.name + where, rings=rings) for phase in phases)
 
 
 STRATEGIES: dict[str, tuple[Phase, ...]] = {
     "auto": (
         *_starts(RINGS),
         *_starts(),
+        *_starts(slides=True),
         replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
         _FOLDOVER,
         _LP_COEFFICIENTS,

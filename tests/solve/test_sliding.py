@@ -190,3 +190,13 @@ def test_moves_keep_to_a_line_or_plane(move: int) -> None:
             steps = np.linspace(-0.4, 0.4, 17)
             for step in np.stack(np.meshgrid(*[steps] * len(axes), indexing="ij"), axis=-1).reshape(-1, len(axes)):
                 assert smallest(there[v] + step @ axes) <= best + 1e-12
+
+
+def test_a_boundary_that_is_not_tangled_stays_until_the_inside_is_mended() -> None:
+    """Laplacian sweeps would draw it together where its faces are not convex."""
+    valid = Mesh.build(*elements.hex_bracket())
+    tangled, _ = perturb(valid, 25, 2 * valid.mean_edge_length())
+    outcome = untangle(sliding(tangled), smooth=0)
+    assert outcome.valid
+    boundary = valid.topology.boundary
+    assert np.array_equal(outcome.after.points[boundary], valid.points[boundary])

@@ -116,11 +116,23 @@ def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:
         cells,
         load=lambda: _arrays(sources, by_piece, chosen, origins),
         regions=_regions(family, sources),
-        held=ghost_vertices(cells, len(chosen)),
+        held=_held(sources, by_piece, cells, len(chosen)),
         untold=_distinct(source.untold for source in sources),
         notes=(note, *_distinct(source.notes for source in sources)),
         pieces=Joined(family, sources, by_piece, origins),
     )
+
+
+def _held(sources: Sequence[Source], rows: Sequence[Int64], cells: Sequence[Cells], n: int) -> NDArray[np.bool_] | None:
+    """Mark the points (n,) of ghost cells, and those that pieces hold for another reason; None: there are none."""
+    ghosts, held = ghost_vertices(cells, n), np.zeros(n, dtype=bool)
+    for source, mine in zip(sources, rows, strict=True):
+        if source.held is not None:
+            of_ghosts = ghost_vertices(source.cells, len(source.points))
+            held[mine[source.held if of_ghosts is None else source.held & ~of_ghosts]] = True
+    if ghosts is None:
+        return held if held.any() else None
+    return held | ghosts
 
 
 def _filled(sources: Sequence[Source]) -> list[Source]:

@@ -170,7 +170,7 @@ class Source:
     regions : tuple of str
         Names of cell arrays that tell materials apart.
     held : (n,) bool or None
-        Points that the file itself declares as fixed.
+        Points that the file itself declares as fixed, or that must not move alone.
     untold : tuple of str
         What the file holds beside `arrays`, and no other format would: comments, sections, keywords.
     notes : tuple of str

@@ -79,7 +79,18 @@ def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
             file.untold[f"numbers of {what}"] = None
     notes = ("the parameters (u, v) of nodes on curves and faces stay as they are",) * file.parametric
     points = coordinates.read(data)
-    return Source(points, cells, layout, load, regions, None, tuple(file.untold), notes, numbers=lambda: tags)
+    held = _paired(file, find, len(tags))
+    return Source(points, cells, layout, load, regions, held, tuple(file.untold), notes, numbers=lambda: tags)
+
+
+def _paired(file: File, find: Callable[[Int64], Int64], n: int) -> NDArray[np.bool_] | None:
+    """Mark the nodes (n,) that have a copy or are one: moved alone, they would not lie as the file tells."""
+    if not file.periodic:
+        return None
+    rows = find(np.concatenate(file.periodic))
+    paired = np.zeros(n, dtype=bool)
+    paired[rows[rows >= 0]] = True
+    return paired
 
 
 def _refuse() -> Places:

@@ -21,6 +21,7 @@ _SECTION = re.compile(rb"(?:^|\A\xef\xbb\xbf)\$(?!End|END)(\w{0,60})[^\n]*(?:\n|
 _END = re.compile(rb"\s*\$(?:End|END)(\w+)")
 _FORMAT = re.compile(rb"\s*(\d+(?:\.\d+)?)[ \t]+([01])[ \t]+(\d+)[^\n]*\n")
 _NAME = re.compile(rb'^\s*(\d)\s+(-?\d{1,18})\s+"([^\n]*)"', re.MULTILINE)
+_AFFINE = re.compile(rb"\s*Affine\b[^\n]*\n")
 _TOLD = ("MeshFormat", "PhysicalNames", "Nodes", "Elements", "NodeData", "ElementData", "NOD", "NOE", "ELM")
 Numbers = Text | Binary
 _Readers = Mapping[str, Callable[[Any, "File"], None]]
@@ -78,6 +79,8 @@ class File:
         Whether nodes have parameters of the curve or face on which they lie.
     first : bool
         Whether it is of version 1.
+    periodic : list of int64
+        Numbers of nodes that have a copy elsewhere, or are one, as where a mesh is periodic.
     """
 
     tags: list[Int64] = field(default_factory=list)
@@ -92,6 +95,7 @@ class File:
     untold: dict[str, None] = field(default_factory=dict)
     parametric: bool = False
     first: bool = False
+    periodic: list[Int64] = field(default_factory=list)
 
     def ghosts(self, block: Block) -> NDArray[np.bool_] | None:
         """Mark all elements (m,) of a block that belongs to another partition."""
@@ -353,13 +357,39 @@ def _entities(numbers: Numbers, file: File, partitioned: bool) -> None:
                 numbers.ints(int(numbers.sizes(1)[0]))
 
 
+def _periodic_2(numbers: Numbers, file: File) -> None:
+    """Read pairs of nodes, which are text in binary files as well: entities, maybe a transformation, and the pairs."""
+    text = Text(numbers.data, numbers.at)
+    for _ in range(text.count()):
+        text.ints(3)
+        if match := _AFFINE.match(text.data, text.at):
+            text.at = match.end()
+        file.periodic.append(text.ints(2 * text.count()))
+    numbers.at = text.at
+
+
+def _periodic_4(numbers: Numbers, file: File) -> None:
+    """Read pairs of nodes: entities, the numbers of a transformation, and the pairs."""
+    for _ in range(int(numbers.sizes(1)[0])):
+        numbers.ints(3)
+        if count := int(numbers.sizes(1)[0]):
+            numbers.coordinates(1, count)
+        file.periodic.append(numbers.sizes(2 * int(numbers.sizes(1)[0])))
+
+
 _READERS: dict[int, _Readers] = {
     1: {"NOD": _nodes_2, "NOE": _nodes_2, "Nodes": _nodes_2, "ELM": _elements_1, "Elements": _elements_1},
-    2: {"Nodes": _nodes_2, "ParametricNodes": _parametric_nodes_2, "Elements": _elements_2},
+    2: {
+        "Nodes": _nodes_2,
+        "ParametricNodes": _parametric_nodes_2,
+        "Elements": _elements_2,
+        "Periodic": _periodic_2,
+    },
     4: {
         "Nodes": _nodes_4,
         "Elements": _elements_4,
         "Entities": partial(_entities, partitioned=False),
         "PartitionedEntities": partial(_entities, partitioned=True),
+        "Periodic": _periodic_4,
     },
 }

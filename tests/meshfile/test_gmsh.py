@@ -17,8 +17,6 @@ from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import formats, gmsh
 from meshfix_cli.meshfile.gmsh.cells import TYPES
-from meshfix_cli.meshfile.reading import read as read_document
-from meshfix_cli.meshfile.sliding import slid
 from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
@@ -157,47 +155,6 @@ def test_an_entity_in_several_groups_is_told_from_others_by_their_set(tmp_path: 
     assert by_type == {"triangle": 0, "tetra": 2}
     names = {name: tuple(pair) for name, pair in arrays.groups.items()}
     assert names == {"wall": (5, 2), "steel": (10, 3), "copper": (11, 3), "all of it": (12, 3)}
-
-
-@pytest.mark.parametrize("binary", [False, True])
-@pytest.mark.parametrize("version", [2.2, 4.1])
-def test_periodic_nodes_do_not_slide(version: float, binary: bool, tmp_path: Path) -> None:
-    path, across = tmp_path / "periodic.msh", [1, 0, 0, 1, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]
-    with gmsh_session(MshFileVersion=version, Binary=binary, MeshSizeMax=0.3) as session:
-        session.model.occ.addBox(0, 0, 0, 1, 1, 1)
-        session.model.occ.synchronize()
-        session.model.mesh.setPeriodic(2, [2], [1], across)  # x = 1 is a copy of x = 0
-        session.model.mesh.generate(3)
-        session.write(str(path))
-        _, copies, originals, _ = session.model.mesh.getPeriodicNodes(2, 2, True)
-    document = read_document(str(path))
-    points = document.mesh.points
-    held = np.isin(points[:, 0], (0.0, 1.0))
-    assert held.sum() == len(copies) + len(originals)
-    assert np.array_equal(document.source.held, held)
-    sliding = slid(document).mesh
-    assert not (sliding.movable & held).any()
-    assert (sliding.movable & ~document.mesh.movable).any()
-
-
-@pytest.mark.parametrize(
-    ("section", "message"),
-    [
-        ("1\n1 2 1\n9\n2 1\n", "truncated"),
-        ("1\n1 2 1\nAffine 1 0 0\n1\n2 one\n", "not an integer"),
-        ("7000000\n1 2 1\n1\n2 1\n", "truncated|not an integer"),
-    ],
-)
-def test_damaged_pairs_of_nodes_are_told(section: str, message: str) -> None:
-    with pytest.raises(ReadError, match=message):
-        gmsh.parse(text_2(rest=f"$Periodic\n{section}$EndPeriodic\n"))
-
-
-def test_pairs_may_name_nodes_that_were_not_saved() -> None:
-    source = gmsh.parse(text_2(rest="$Periodic\n1\n1 2 1\n2\n2 1\n77 4\n$EndPeriodic\n"))
-    assert source is not None
-    assert source.held is not None
-    assert source.held.tolist() == [True, True, False, True, False]
 
 
 def test_both_versions_hold_the_interface_of_materials(tmp_path: Path) -> None:

@@ -69,9 +69,11 @@ class Held:
         from meshfix_cli.errors import naming
         from meshfix_cli.mesh.reference import reference_points
 
-        mesh = replace(self, fix=(), regions=None, input_format=None).read(source, threads).mesh
+        reference = replace(self, fix=(), regions=None, input_format=None).read(source, threads)
         with naming(f"{source}: as a reference"):
-            return reference_points(document.mesh, mesh, threads)
+            points = reference_points(document.mesh, reference.mesh, threads)
+            alike = reference.seen_from(document)
+            return points if alike is None else document.mesh.along_curve(alike)
 
 
 @dataclass(frozen=True)

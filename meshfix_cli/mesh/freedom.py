@@ -80,6 +80,22 @@ class Freedom:
         result[rows] = np.where(changed, there, anchors[rows])
         return result
 
+    def turned(self, before: Array, now: Array) -> Mask:
+        """Mark (k,) those that slide beside a vertex which has left their line or plane since: it has others now.
+
+        Positions (k, d): before, when lines and planes were found, and now. These may have moved as a whole.
+        """
+        first = np.repeat(np.arange(len(self.frame)), np.diff(self.offsets))
+        edges, moved = before[first] - before[self.neighbours], now - before
+        some = np.arange(before.shape[1]) < self.directions[self.frame[first]][:, None]
+        axes = np.where(some[:, :, None], self.axes[self.frame[first]], 0.0)
+        apart = moved[first] - moved[self.neighbours]
+        apart -= np.einsum("vik,vi->vk", axes, np.einsum("vik,vk->vi", axes, apart))
+        length = float(np.linalg.norm(edges, axis=1).mean()) if len(edges) else 0.0
+        mask = np.zeros(len(before), dtype=bool)
+        mask[first[np.linalg.norm(apart, axis=1) > tolerance_of(now, length) * length]] = True
+        return mask
+
 
 def constraints_of(
     topology: Topology, points: Array, regions: NDArray[np.integer] | None = None, tangled: bool = True

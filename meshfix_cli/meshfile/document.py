@@ -24,6 +24,7 @@ from meshfix_cli.meshfile.splice import Turned
 
 FREE = "none"  # the name of no array of regions, by which interfaces are freed
 # Reasons to hold vertices that may slide all the same, where they are asked to.
+SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
 BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
 
 
@@ -133,6 +134,12 @@ class Document:
         if large.any() and large[mesh.topology.used].any():
             raise InvalidMeshError("the coordinates are too large for the numbers of the file")
         return mesh.with_points(np.ascontiguousarray(points if self.basis is None else _flat(points, self.basis)))
+
+    def seen_from(self, other: Document) -> NDArray[np.float64] | None:
+        """Return the points (n, 2) as another document in the same plane in space has them; None: it lies elsewhere."""
+        if self.basis is None or other.basis is None or abs(np.linalg.det(self.basis @ other.basis.T)) < 1 - SAME_PLANE:
+            return None
+        return other.in_plane(self.source.points.astype(np.float64), self.mesh).points
 
     def first_valid_as_stored(self, *meshes: Mesh, threads: int = 1) -> tuple[Mesh, int]:
         """Return the first of some moved meshes that is valid as the file stores it, else the best.

@@ -43,6 +43,8 @@ def slid(
     labels = _joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
     freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines))
     held = cells.held | _twins(document)
+    if reference is not None:
+        held |= topology.of_vertices(freedom.turned(reference, mesh.along_curve(mesh.points)))
     for reason, mask in document.holds.items():
         if reason not in (ON_BOUNDARY, ON_CELLS) and not (interfaces and reason.startswith(BETWEEN)):
             held |= mask

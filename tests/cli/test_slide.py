@@ -64,6 +64,37 @@ def test_lines_in_a_face_end_patches_and_their_vertices_slide_along_them(tmp_pat
     assert (np.diff(after[across, 0]) > 0).all()
 
 
+def test_edges_in_an_oblique_plane_are_those_of_the_reference(tmp_path: Path) -> None:
+    flat, triangles = grid(np.linspace(0, 2, 9), np.linspace(0, 1, 5))
+    frame = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
+    clean, bad, good = (tmp_path / f"{name}.vtk" for name in ("clean", "bad", "good"))
+    meshio.Mesh(np.insert(flat, 2, 0.0, axis=1) @ frame, [("triangle", triangles)]).write(clean)
+    run("perturb", "--percent", "60", "--dist", "1h", "--boundary", clean, bad)
+    run("untangle", "--slide", "flat", "--reference", clean, bad, good)
+    after = points_of(good) @ frame.T
+    assert np.abs(after[:, 2]).max() < 1e-13
+    for k, sides in enumerate(((0, 2), (0, 1))):
+        for side in sides:
+            assert np.abs(after[flat[:, k] == side, k] - side).max() < 1e-13
+
+
+@pytest.mark.parametrize("angle", [0, 30])
+def test_what_has_been_turned_since_the_reference_does_not_slide_as_it_lay_there(tmp_path: Path, angle: float) -> None:
+    points, triangles = grid(*[np.linspace(-3, 3, 25)] * 2)
+    triangles = triangles[(np.abs(points[triangles].mean(axis=1)) > 1).any(axis=1)]  # a square hole
+    clean, bad, good = (tmp_path / f"{name}.vtk" for name in ("clean", "bad", "good"))
+    hole, turn = (np.abs(points) <= 1).all(axis=1), np.exp(1j * np.radians(angle))
+    moved = points.copy()
+    moved[hole] = np.stack([((points @ [1, 1j]) * turn).real, ((points @ [1, 1j]) * turn).imag], axis=1)[hole]
+    for name, place in ((clean, points), (bad, moved)):
+        meshio.Mesh(np.insert(place, 2, 0.0, axis=1), [("triangle", triangles)]).write(name)
+    run("untangle", "--slide", "flat", "--reference", clean, bad, good)
+    back = (points_of(good)[:, :2] @ [1, 1j]) / turn
+    rim = hole & np.isin(np.arange(len(points)), triangles)
+    largest = np.maximum(np.abs(back.real), np.abs(back.imag))
+    assert np.abs(largest[rim] - 1).max() < 1e-12  # on the square
+
+
 @pytest.mark.parametrize("slides", [True, False])
 def test_interfaces_slide_unless_they_are_told_not_to(tmp_path: Path, slides: bool) -> None:
     clean, bad, good = tangled(tmp_path, regions=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.elements import SIMPLICES
-from meshfix_cli.mesh.freedom import Freedom
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mixed import build_mixed, checked_blocks
 from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, read_only, refers_outside, rows_of
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.freedom import Freedom
 
 _T = TypeVar("_T", bound=np.generic)
 

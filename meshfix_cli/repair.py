@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 
 NEAR_CEILING = 0.9  # of it: from there on it is what limits the smallest angle or scaled Jacobian
+MAX_DEVIATION = Distance(0.03, in_h=True)
 
 
 @dataclass(frozen=True)
@@ -141,7 +142,7 @@ class Method:
     """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `strategies.plan`.
 
     `slide` and `slide_interfaces` tell which vertices of the boundary and of interfaces move as well, where that does
-    not change the shape.
+    not change the shape, or, with "curved", by little; see `curved.Smooth` for the last two.
     """
 
     strategy: str = "auto"
@@ -150,16 +151,23 @@ class Method:
     threshold: float | None = None
     max_move: Distance | None = None
     only_invalid: bool = False
-    slide: Literal["none", "flat"] = "none"
+    slide: Literal["none", "flat", "curved"] = "none"
     slide_interfaces: bool = True
+    feature_angle: float = 40.0
+    max_deviation: Distance = MAX_DEVIATION
 
     def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
         """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
         if self.slide == "none":
             return document
+        from meshfix_cli.mesh.curved import Smooth
         from meshfix_cli.meshfile.sliding import slid
 
-        return slid(document, self.slide_interfaces, reference)
+        smooth = None
+        if self.slide == "curved":
+            mesh = document.mesh if reference is None else document.mesh.with_vertices(reference)
+            smooth = Smooth(self.feature_angle, self.max_deviation.length(mesh))
+        return slid(document, self.slide_interfaces, reference, smooth=smooth)
 
     def reach(self, mesh: Mesh, threads: int) -> float:
         """Return how far vertices may move, in model units."""
@@ -257,7 +265,10 @@ class Judge:
         metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
         summaries = {stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown}
         if not (self.brief or command == "perturb"):
-            more["facts"] = {**(more.get("facts") or {}), **self._sliding(document, result, summaries[shown[-1]], most)}
+            start = next(iter(stages.values()))
+            before = start if reference is None else start.with_vertices(reference)
+            slides = self._sliding(document, before, result, summaries[shown[-1]], most)
+            more["facts"] = {**(more.get("facts") or {}), **slides}
         return Report(
             name=document.name,
             command=command,
@@ -274,16 +285,28 @@ class Judge:
             **more,
         )
 
-    def _sliding(self, document: Document, result: Mesh, summary: Summary, most: float | None) -> dict[str, Any]:
-        """Return how many vertices slide or, where none may and a ceiling limits the mesh, what might be gained."""
-        if result.freedom is not None:
-            moving = result.freedom.degrees[result.along_curve(result.movable)]
-            return {"sliding": {"lines": int((moving == 1).sum()), "planes": int((moving == 2).sum())}}
+    def _sliding(
+        self, document: Document, before: Mesh, result: Mesh, summary: Summary, most: float | None
+    ) -> dict[str, Any]:
+        """Return how many vertices slide, and what that made of the shape.
+
+        Where none may and a ceiling limits the mesh: what might be gained. `before`: where the shape was found.
+        """
+        from meshfix_cli.quality.summary import ceiling, change_of_shape
+
+        freedom = result.freedom
+        if freedom is not None:
+            moving = result.along_curve(result.movable)
+            flat, curved = freedom.degrees[moving & ~freedom.curved], freedom.degrees[moving & freedom.curved]
+            counts = {"lines": int((flat == 1).sum()), "planes": int((flat == 2).sum())}
+            if freedom.shapes is None:
+                return {"sliding": counts}
+            counts.update(curves=int((curved == 1).sum()), surfaces=int((curved == 2).sum()))
+            return {"sliding": counts, "shape": change_of_shape(before, result, self.threads)}
         valid = summary.inverted == 0
         if most is None or (valid and summary.smallest < NEAR_CEILING * most):
             return {}
         from meshfix_cli.meshfile.sliding import slid
-        from meshfix_cli.quality.summary import ceiling
 
         sliding = slid(replace(document, mesh=result), tangled=not valid).mesh
         after = ceiling(sliding, self.threads)

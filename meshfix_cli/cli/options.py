@@ -14,7 +14,7 @@ from meshfix_cli.cli.files import given
 from meshfix_cli.cli.names import CELLS, FILE, PAGE, PLOT
 from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
-from meshfix_cli.repair import Files, Held, Judge, Method
+from meshfix_cli.repair import MAX_DEVIATION, Files, Held, Judge, Method
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
@@ -292,11 +292,27 @@ solving = packed(
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
     click.option(
         "--slide",
-        type=click.Choice(("none", "flat")),
+        type=click.Choice(("none", "flat", "curved")),
         default="none",
         show_default=True,
         help="Let vertices of the boundary move where that does not change its shape. flat: in planes and on straight "
-        "edges; corners and what is curved stay.",
+        "edges; corners and what is curved stay. curved: on smooth surfaces and along their edges as well, which "
+        "changes the shape a little.",
+    ),
+    click.option(
+        "--feature-angle",
+        type=_Range(0, 180),
+        default=40.0,
+        show_default=True,
+        metavar="DEGREES",
+        help="With --slide curved: facets that meet at a larger angle meet at an edge that stays.",
+    ),
+    click.option(
+        "--max-deviation",
+        type=LENGTH,
+        default=str(MAX_DEVIATION),
+        show_default=True,
+        help="With --slide curved: no step takes the middles of edges and facets farther from the shape.",
     ),
     click.option(
         "--slide-interfaces/--no-slide-interfaces",

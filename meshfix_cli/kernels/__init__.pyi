@@ -140,11 +140,32 @@ class Connectivity:
 class Freedom:
     """Where vertices may go, see mesh/freedom.hpp; copies of what it is given."""
 
-    def __init__(self, frame: Int32, directions: Uint8, axes: Float64, offsets: Int32, neighbours: Int32) -> None:
+    def __init__(
+        self, frame: Int32, directions: Uint8, axes: Float64, offsets: Int32, neighbours: Int32,
+        reference: Reference | None = None,
+    ) -> None:  # fmt: skip
         """Take the frame (n,) of each vertex, -1: it may go anywhere; the directions (f,) and axes (f, d, d) of frames.
 
         The neighbours of a vertex in its line or plane begin at its offset (n + 1,); both may be empty where only
-        gradients are asked for.
+        gradients are asked for. With a reference, the last frames are its shapes, and have no axes.
+        """
+
+    def keep_near(self, offsets: Int32, around: Int32, bound: float) -> None:
+        """Take what is around vertices on the reference, see mesh/freedom.hpp, and how far it may be from that."""
+
+class Reference:
+    """Surfaces and curves, see mesh/reference.hpp; copies of what it is given."""
+
+    def __init__(self, corners: Float64, ways: Float64, first: Int32, directions: Uint8) -> None:
+        """Take the corners (p, d, d) of pieces, normals or tangents there, and of each shape the first and directions.
+
+        `first` (s + 1,) ends with the number of pieces; `directions` (s,) is 2 for a surface and 1 for a curve.
+        """
+
+    def nearest(self, points: Float64, shapes: Int32, threads: int) -> tuple[Float64, Float64]:
+        """Put points (q, d) on their shapes (q,), which are rounded between corners.
+
+        The distances (q,) are those from the pieces as they are.
         """
 
 def joined(pairs: Int32, n: int) -> Int32:

@@ -1,9 +1,10 @@
-"""Who may move where: vertices of a flat boundary in its planes and along its edges, the others anywhere or nowhere."""
+"""Who may move where: in planes and along edges, on curved surfaces and along curves, others anywhere or nowhere."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.patches import Constraints, Slides, lines_of_plane, of_solid, tolerance_of
 from meshfix_cli.mesh.topology import Topology
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.curved import Shapes, Smooth
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,14 +29,18 @@ class Freedom:
     Attributes
     ----------
     frame : (k,) int32
-        The line or plane of each that slides; -1: it may go anywhere, or is held, as `Mesh.movable` tells.
+        The line or plane of each that slides and, behind these, its curve or surface; -1: it may go anywhere, or is
+        held, as `Mesh.movable` tells.
     directions : (f,) uint8
         How many directions each of these has: 1 or 2.
-    axes : (f, d, d) float64
-        Orthonormal rows, of which the first span these directions; coordinates that none of them changes stay exactly.
+    axes : (g, d, d) float64
+        Of lines and planes: orthonormal rows, of which the first span these directions; coordinates that none of them
+        changes stay exactly.
     offsets : (k+1,) int32
     neighbours : int32
-        Of each vertex that slides those in its line or plane, one vertex behind the other.
+        Of each vertex that slides those in what it slides in, one vertex behind the other.
+    shapes : Shapes or None
+        The curves and surfaces, f - g of them; None: there are none.
     """
 
     frame: Numbers
@@ -40,11 +48,22 @@ class Freedom:
     axes: Array
     offsets: Numbers
     neighbours: Numbers
+    shapes: Shapes | None = None
 
     @cached_property
     def kernel(self) -> kernels.Freedom:
         """The same for the kernels."""
-        return kernels.Freedom(self.frame, self.directions, self.axes, self.offsets, self.neighbours)
+        flat = self.frame, self.directions, self.axes, self.offsets, self.neighbours
+        if self.shapes is None:
+            return kernels.Freedom(*flat)
+        made = kernels.Freedom(*flat, self.shapes.kernel())
+        made.keep_near(self.shapes.offsets, self.shapes.around, self.shapes.bound)
+        return made
+
+    @cached_property
+    def curved(self) -> Mask:
+        """(k,) bool: those that slide on curves and surfaces."""
+        return self.frame >= len(self.axes)
 
     @cached_property
     def degrees(self) -> NDArray[np.uint8]:
@@ -52,7 +71,7 @@ class Freedom:
         return np.append(self.directions, np.uint8(0))[self.frame]
 
     def of(self, vertices: NDArray[np.integer]) -> kernels.Freedom:
-        """Return what some vertices (v,), in their order, may do; without neighbours."""
+        """Return what some vertices (v,), in their order, may do, none of them curved; without neighbours."""
         none = np.empty(0, dtype=np.int32)
         return kernels.Freedom(self.frame[vertices], self.directions, self.axes, none, none)
 
@@ -64,11 +83,13 @@ class Freedom:
         counts[own:] = 0
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
         places = np.arange(offsets[-1]) + np.repeat(self.offsets[vertices] - offsets[:-1], counts)
-        return Freedom(self.frame[vertices], self.directions, self.axes, offsets, number[self.neighbours[places]])
+        neighbours = number[self.neighbours[places]]
+        shapes = None if self.shapes is None else self.shapes.part(vertices, number, own)
+        return Freedom(self.frame[vertices], self.directions, self.axes, offsets, neighbours, shapes)
 
     def onto(self, points: Array, anchors: Array) -> Array:
         """Return points (k, d) with those that slide in their lines and planes through anchors (k, d)."""
-        rows = np.flatnonzero(self.frame >= 0)
+        rows = np.flatnonzero((self.frame >= 0) & ~self.curved)
         count = self.directions[self.frame[rows]]
         some = np.arange(points.shape[1]) < count[:, None]
         axes = np.where(some[:, :, None], self.axes[self.frame[rows]], 0.0)
@@ -83,18 +104,33 @@ class Freedom:
     def turned(self, before: Array, now: Array) -> Mask:
         """Mark (k,) those that slide beside a vertex which has left their line or plane since: it has others now.
 
-        Positions (k, d): before, when lines and planes were found, and now. These may have moved as a whole.
+        Positions (k, d): before, when lines and planes were found, and now. These may have moved as a whole. Vertices
+        that slide on a curved surface leave planes beside it.
         """
-        first = np.repeat(np.arange(len(self.frame)), np.diff(self.offsets))
-        edges, moved = before[first] - before[self.neighbours], now - before
+        first, other = np.repeat(np.arange(len(self.frame)), np.diff(self.offsets)), self.neighbours
+        flat = ~(self.curved[first] | self.curved[other])
+        first, other = first[flat], other[flat]
+        edges, moved = before[first] - before[other], now - before
         some = np.arange(before.shape[1]) < self.directions[self.frame[first]][:, None]
         axes = np.where(some[:, :, None], self.axes[self.frame[first]], 0.0)
-        apart = moved[first] - moved[self.neighbours]
+        apart = moved[first] - moved[other]
         apart -= np.einsum("vik,vi->vk", axes, np.einsum("vik,vk->vi", axes, apart))
         length = float(np.linalg.norm(edges, axis=1).mean()) if len(edges) else 0.0
         mask = np.zeros(len(before), dtype=bool)
         mask[first[np.linalg.norm(apart, axis=1) > tolerance_of(now, length) * length]] = True
         return mask
+
+    def rounded(self, points: Array, threads: int = 1) -> tuple[Array, Array]:
+        """Return points (k, d) with those that slide on curves and surfaces there, and how far (k,) they were off.
+
+        That is from the rounded shape or from its pieces, whichever is nearer.
+        """
+        result, distances = points.copy(), np.zeros(len(points))
+        if self.shapes is not None:
+            rows, shape = np.flatnonzero(self.curved), self.frame[self.curved] - np.int32(len(self.axes))
+            result[rows], far = self.shapes.kernel().nearest(points[rows], shape, threads)
+            distances[rows] = np.minimum(far, np.linalg.norm(result[rows] - points[rows], axis=1))
+        return result, distances
 
 
 def constraints_of(
@@ -125,7 +161,7 @@ def constraints_of(
     return Constraints(facets, labels, np.empty((0, 2), dtype=np.int32), inverted[owners], broken)
 
 
-def freedom_of(points: Array, constraints: Constraints) -> Freedom:
+def freedom_of(points: Array, constraints: Constraints, smooth: Smooth | None = None) -> Freedom:
     """Find who may slide where, without a change of the shape.
 
     Parameters
@@ -133,6 +169,8 @@ def freedom_of(points: Array, constraints: Constraints) -> Freedom:
     points : (k, d) float64
         In the order of the connectivity.
     constraints : Constraints
+    smooth : Smooth, optional
+        Let those on curved surfaces and along curves slide as well.
     """
     k, d = points.shape
     ends = constraints.facets[:, :2]
@@ -143,10 +181,21 @@ def freedom_of(points: Array, constraints: Constraints) -> Freedom:
     for slides in found:
         frame[slides.vertices] = known + slides.frame
         known += len(slides.axes)
-    offsets, neighbours = _rows([_pairs(slides, k) for slides in found], k)
+    pairs = [_pairs(slides, k) for slides in found]
     directions = [np.full(len(slides.axes), slides.directions, dtype=np.uint8) for slides in found]
     axes = np.ascontiguousarray(np.concatenate([slides.axes for slides in found]))
-    return Freedom(frame, np.concatenate(directions), axes, offsets, neighbours)
+    if smooth is None:
+        return Freedom(frame, np.concatenate(directions), axes, *_rows(pairs, k))
+    from meshfix_cli.mesh.curved import curved_of
+
+    degrees = np.append(np.concatenate(directions), np.uint8(0))
+    curved = curved_of(points, constraints, smooth, degrees[frame])
+    mine = curved.shape >= 0
+    frame[mine] = known + curved.shape[mine]
+    pairs = [*(some[~mine[some[:, 0]]] for some in pairs), curved.pairs]
+    directions.append(curved.shapes.directions)
+    shapes = curved.shapes if len(curved.shapes.directions) else None
+    return Freedom(frame, np.concatenate(directions), axes, *_rows(pairs, k), shapes)
 
 
 def _pairs(slides: Slides, k: int) -> Numbers:

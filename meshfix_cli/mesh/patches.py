@@ -91,7 +91,7 @@ def lines_of_plane(points: Array, given: Constraints, tolerance: float) -> Slide
     """Find the vertices of a plane mesh that slide; facets are edges there, and meet at vertices."""
     surface = _Surface(points, given, tolerance)
     corners, owners = given.facets.ravel(), np.repeat(np.arange(len(given.facets), dtype=np.int32), 2)
-    vertices, pairs = _of_two(corners, owners, len(points))
+    vertices, pairs = of_two(corners, owners, len(points))
     smooth, patch = surface.patches(pairs)
     vertices, pairs = vertices[smooth], pairs[smooth]
     both = np.repeat(vertices, 2)
@@ -104,8 +104,8 @@ def lines_of_plane(points: Array, given: Constraints, tolerance: float) -> Slide
 def of_solid(points: Array, given: Constraints, tolerance: float) -> list[Slides]:
     """Find the vertices of a solid mesh that slide along edges, and in planes."""
     surface = _Surface(points, given, tolerance)
-    sides = _sides(given.facets)
-    edges, here, count, is_line = _edges(sides, given.lines)
+    sides = sides_of(given.facets)
+    edges, here, count, is_line = edges_of(sides, given.lines)
     pair = np.flatnonzero((count == 2) & ~is_line)
     first = np.concatenate([[0], np.cumsum(count)])[pair]
     two = np.stack([here[first], here[first + 1]], axis=1)  # sides
@@ -155,7 +155,7 @@ def _in_planes(surface: _Surface, around: _Around, creases: Numbers, edges: Numb
 def _along_edges(surface: _Surface, around: _Around, creases: Numbers, facets: Places) -> Slides:
     points, tolerance = surface.points, surface.tolerance
     which = np.repeat(np.arange(len(creases), dtype=np.int32), 2)
-    vertices, pairs = _of_two(creases.ravel(), which, len(points))
+    vertices, pairs = of_two(creases.ravel(), which, len(points))
     ways = points[creases[pairs].sum(axis=2) - vertices[:, None]] - points[vertices][:, None]
     straight = _sine(ways[:, 0], ways[:, 1]) <= tolerance
     straight &= ((ways[:, 0] * ways[:, 1]).sum(axis=1) < 0) | surface.given.broken[vertices]
@@ -177,7 +177,7 @@ def _flat_sides(surface: _Surface, around: _Around, vertices: Numbers) -> Mask:
     mine[vertices] = True
     mine = mine[around.vertices]
     corners, owners, fan = around.vertices[mine], around.owners[mine], around.fan[mine]
-    number, _ = _numbered(fan, len(around.fan))
+    number, _ = numbered(fan, len(around.fan))
     place = number[fan]
     normals = surface.normals[owners]
     spread, _ = _common_direction(normals, place, int(place.max(initial=-1)) + 1)
@@ -192,7 +192,7 @@ class _Surface:
 
     def __init__(self, points: Array, given: Constraints, tolerance: float) -> None:
         self.points, self.given, self.tolerance = points, given, tolerance
-        self.normals, self.bent = _normals(points, given.facets, tolerance)
+        self.normals, self.bent = normals_of(points, given.facets, tolerance)
         self.areas = np.linalg.norm(self.normals, axis=1)
 
     def patches(self, pairs: Numbers) -> tuple[Mask, Numbers]:
@@ -231,7 +231,7 @@ class _Surface:
         return ~by_itself & (np.linalg.norm(sums, axis=1) > SLIT * np.bincount(patch, self.areas, count))
 
 
-def _normals(points: Array, facets: Numbers, tolerance: float) -> tuple[Array, Mask]:
+def normals_of(points: Array, facets: Numbers, tolerance: float) -> tuple[Array, Mask]:
     """Return normals (f, d), as long as the facets are large, and which facets are not flat."""
     p = points[facets]
     if points.shape[1] == 2:
@@ -259,7 +259,7 @@ def _sine(one: Array, other: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class _Sides:
+class Sides:
     """The sides (s,) of facets in space: from the smaller vertex to the larger, their facets, their corners there."""
 
     vertices: Numbers
@@ -269,7 +269,8 @@ class _Sides:
     corner_owners: Numbers
 
 
-def _sides(facets: Numbers) -> _Sides:
+def sides_of(facets: Numbers) -> Sides:
+    """Return the sides of facets (f, w)."""
     there = facets >= 0
     rows, places = np.nonzero(there)
     corner = np.full(facets.shape, -1, dtype=np.int32)
@@ -279,10 +280,10 @@ def _sides(facets: Numbers) -> _Sides:
     ends = np.stack([corner[rows, places], corner[rows, after]], axis=1)
     turned = vertices[:, 0] > vertices[:, 1]
     vertices[turned], ends[turned] = vertices[turned, ::-1], ends[turned, ::-1]
-    return _Sides(vertices, rows.astype(np.int32), ends, facets[there], rows.astype(np.int32))
+    return Sides(vertices, rows.astype(np.int32), ends, facets[there], rows.astype(np.int32))
 
 
-def _edges(sides: _Sides, lines: Numbers) -> tuple[Numbers, NDArray[np.intp], NDArray[np.int64], Mask]:
+def edges_of(sides: Sides, lines: Numbers) -> tuple[Numbers, NDArray[np.intp], NDArray[np.int64], Mask]:
     """Return the edges (e, 2), the sides of facets edge by edge, how many each has (e,), and which are lines."""
     both = np.concatenate([sides.vertices, np.sort(lines, axis=1)]).astype(np.int64)
     key = both[:, 0] << 32 | both[:, 1]
@@ -296,7 +297,7 @@ def _edges(sides: _Sides, lines: Numbers) -> tuple[Numbers, NDArray[np.intp], ND
     return both[order[is_first]].astype(np.int32), order[is_side], count, is_line
 
 
-def _of_two(vertices: Numbers, things: Numbers, n: int) -> tuple[Numbers, Numbers]:
+def of_two(vertices: Numbers, things: Numbers, n: int) -> tuple[Numbers, Numbers]:
     """Return the vertices (v,) that two of some things (x,) are at, at vertices (x,), and these (v, 2)."""
     count = np.bincount(vertices, minlength=n)
     order = np.argsort(vertices, kind="stable")
@@ -316,7 +317,7 @@ class _Frames:
 
 def _lines(points: Array, ways: Array, ends: Numbers, group: Numbers, wanted: Numbers, tolerance: float) -> _Frames:
     """Return the lines in which the groups (v,) wanted lie, of edges that are ways (x, d) between ends (x, 2)."""
-    number, mine = _numbered(wanted, len(group))
+    number, mine = numbered(wanted, len(group))
     rows = np.flatnonzero(number[group] >= 0)
     place = number[group[rows]]
     spread, axes = _common_direction(ways[rows], place, mine)
@@ -327,7 +328,7 @@ def _lines(points: Array, ways: Array, ends: Numbers, group: Numbers, wanted: Nu
 
 def _planes(surface: _Surface, patch: Numbers, wanted: Numbers) -> _Frames:
     """Return the planes that patches lie in, those of the patches wanted (v,)."""
-    number, mine = _numbered(wanted, len(patch))
+    number, mine = numbered(wanted, len(patch))
     rows = np.flatnonzero(number[patch] >= 0)
     place = number[patch[rows]]
     spread, axes = _common_direction(surface.normals[rows], place, mine)
@@ -344,7 +345,7 @@ def _kept(good: Mask, axes: Array, frame: Numbers) -> _Frames:
     return _Frames(kept, number[frame[kept]], axes[good])
 
 
-def _numbered(values: Numbers, most: int) -> tuple[Numbers, int]:
+def numbered(values: Numbers, most: int) -> tuple[Numbers, int]:
     """Return a number (most,) for each different value, -1 for others, and how many there are."""
     found = distinct(values)
     number = np.full(most, -1, dtype=np.int32)

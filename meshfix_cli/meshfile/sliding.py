@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,9 @@ from meshfix_cli.mesh.mesh import ON_BOUNDARY
 from meshfix_cli.meshfile.coincident import first_of_each_place
 from meshfix_cli.meshfile.document import BETWEEN, ON_CELLS, Document
 
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.curved import Smooth
+
 Int64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
@@ -22,6 +26,7 @@ def slid(
     interfaces: bool = True,
     reference: NDArray[np.float64] | None = None,
     tangled: bool = True,
+    smooth: Smooth | None = None,
 ) -> Document:
     """Return a document of which the flat boundary may slide.
 
@@ -34,6 +39,8 @@ def slid(
         Where the vertices, in the order of the connectivity, were before the boundary moved: it tells planes and edges.
     tangled : bool
         Whether the boundary may be tangled; see `constraints_of`.
+    smooth : Smooth, optional
+        Let vertices slide on curved surfaces and along curves, too: those that are there.
     """
     mesh, topology = document.mesh, document.mesh.topology
     points = mesh.along_curve(mesh.points) if reference is None else reference
@@ -41,10 +48,12 @@ def slid(
     constraints = constraints_of(topology, points, code, tangled)
     cells = _Cells(document, constraints.facets)
     labels = _joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
-    freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines))
+    freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines), smooth)
     held = cells.held | _twins(document)
     if reference is not None:
         held |= topology.of_vertices(freedom.turned(reference, mesh.along_curve(mesh.points)))
+    if smooth is not None:
+        held |= topology.of_vertices(freedom.rounded(mesh.along_curve(mesh.points))[1] > smooth.bound)
     for reason, mask in document.holds.items():
         if reason not in (ON_BOUNDARY, ON_CELLS) and not (interfaces and reason.startswith(BETWEEN)):
             held |= mask

@@ -253,6 +253,59 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
     return {"mean": float(moved.mean()) if len(moved) else 0.0, "largest": float(far.max()), "vertices": len(moved)}
 
 
+def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, float]:
+    """Measure how a boundary that slides on curves and surfaces has changed.
+
+    Parameters
+    ----------
+    before, after : Mesh
+        The first where the reference of the freedom of the second was found.
+    threads : int
+
+    Returns
+    -------
+    dict
+        "hausdorff", the distance between the two boundaries, see `Shapes.hausdorff`, in model units; "bound", within
+        which steps keep; "folds" of the reference, see `Shapes`; and by which share "size", the volume or area, and
+        "boundary", its area or length, have changed.
+    """
+    shapes = after.freedom.shapes if after.freedom is not None else None
+    if shapes is None:
+        return {"hausdorff": 0.0, "bound": 0.0, "folds": 0, "size": 0.0, "boundary": 0.0}
+    points, there = before.along_curve(before.points), after.along_curve(after.points)
+    facets = after.topology.facets_between(None)[0]
+    (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
+    return {
+        "hausdorff": shapes.hausdorff(there, threads),
+        "bound": shapes.bound,
+        "folds": shapes.folds,
+        "size": _change(size, new_size),
+        "boundary": _change(boundary, new_boundary),
+    }
+
+
+def _change(before: float, after: float) -> float:
+    return after / before - 1 if before > 0 else 0.0
+
+
+def _sizes(points: NDArray[np.float64], facets: NDArray[np.int32]) -> tuple[float, float]:
+    """Return what facets (f, w) enclose, and how large they are themselves; those of four corners by both diagonals."""
+    if points.shape[1] == 2:
+        a, b = points[facets[:, 0]], points[facets[:, 1]]
+        return abs(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())) / 2, float(np.linalg.norm(b - a, axis=1).sum())
+    volume = area = 0.0
+    whole = (facets >= 0).all(axis=1)
+    triangles = [(facets[~whole] if facets.shape[1] == 4 else facets, (0, 1, 2), 1.0)]
+    if facets.shape[1] == 4:
+        triangles += [(facets[whole], cut, 0.5) for cut in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
+    for rows, cut, share in triangles:
+        a, b, c = (points[rows[:, k]] for k in cut)
+        normal = np.cross(b - a, c - a)
+        volume += share * float((normal * a).sum()) / 6
+        area += share * float(np.linalg.norm(normal, axis=1).sum()) / 2
+    return abs(volume), area
+
+
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     """Find what no method can raise: the smallest quality among the elements that have no free vertex.
 

@@ -225,22 +225,10 @@ def _sliding(report: Report) -> str:
     """Say how many vertices slide."""
     if "sliding" not in (report.facts or {}):
         return ""
-    lines, planes = (report.facts or {})["sliding"].values()
-    in_planes = f", {planes:,} in planes" if report.mesh.dimension == 3 else ""
-    return f" ({lines:,} along lines{in_planes})"
-
-
-def sliding(report: Report) -> Iterator[str]:
-    """Say what would be gained if the flat boundary might slide."""
-    gain = (report.facts or {}).get("slide_flat")
-    if gain is None:
-        return
-    could = f"{gain['free_vertices']:,} instead of {int(report.mesh.movable.sum()):,} vertices could move"
-    unit = "°" if report.mesh.topology.simplicial else ""
-    ceiling = "there would be no ceiling"
-    if gain["ceiling"] is not None:
-        ceiling = f"the ceiling would be {gain['ceiling']:.3f}{unit}"
-    yield f"with --slide flat {could}, and {ceiling}"
+    counts, solid = (report.facts or {})["sliding"], report.mesh.dimension == 3
+    words = {"lines": "along lines", "planes": "in planes", "curves": "along curves", "surfaces": "on surfaces"}
+    shown = (f"{n:,} {words[key]}" for key, n in counts.items() if solid or key in ("lines", "curves"))
+    return f" ({', '.join(shown)})"
 
 
 def quality_rows(report: Report) -> list[Row]:

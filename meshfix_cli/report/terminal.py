@@ -27,12 +27,12 @@ from meshfix_cli.report.facts import (
     processes,
     quality_rows,
     required,
-    sliding,
     title,
     verdict,
     what_is_fixed,
 )
 from meshfix_cli.report.plain import plain
+from meshfix_cli.report.sliding import sliding
 
 if TYPE_CHECKING:
     from meshfix_cli.solve.records import SweepRecord

@@ -99,7 +99,15 @@ class Compared:
             share[vertices_of(worse)] *= 0.5
             share[share < 0.5**HALVINGS] = 0.0
             points = np.where(share < 1, self._last + share * way, points)
+            points = self._on_shapes(points, (share > 0) & (share < 1))
         return self._last
+
+    def _on_shapes(self, points: Array, moved: Mask) -> Array:
+        """Return points with those moved (n, 1) that slide on surfaces and curves there: the way back is a chord."""
+        freedom = self._mesh.freedom
+        if freedom is None or freedom.shapes is None:
+            return points
+        return np.where(moved & freedom.curved[:, None], freedom.rounded(points, self._threads)[0], points)
 
     def _judged(self, points: Array) -> tuple[Array, Figures]:
         """Return the scaled Jacobians of the elements (m,), and the figures."""

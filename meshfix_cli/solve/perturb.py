@@ -37,9 +37,9 @@ class Distance:
 def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple[Mesh, int]:
     """Move some interior vertices by a distance in random directions.
 
-    Those of the boundary that slide move in their lines and planes. From the seed come one permutation of the free
-    vertices and one direction for every vertex; so in a series of percentages or distances the same vertices move in
-    the same directions.
+    Those of the boundary that slide move in their lines and planes, and on their curves and surfaces. From the seed
+    come one permutation of the free vertices and one direction for every vertex; so in a series of percentages or
+    distances the same vertices move in the same directions.
 
     Parameters
     ----------
@@ -75,5 +75,7 @@ def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple
     points[chosen] += distance * directions[chosen]
     moved = mesh.with_points(points)
     if mesh.freedom is not None:
-        moved = mesh.with_vertices(mesh.freedom.onto(mesh.along_curve(points), start))
+        there = mesh.freedom.onto(mesh.along_curve(points), start)
+        moving = mesh.freedom.curved & (there != start).any(axis=1)
+        moved = mesh.with_vertices(np.where(moving[:, None], mesh.freedom.rounded(there)[0], there))
     return moved, len(chosen)

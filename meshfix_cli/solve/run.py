@@ -80,6 +80,7 @@ class Run:
         self.stars, self.max_move = mesh.topology.stars(threads), max_move
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
         self.inside, self.freedom = mesh.along_curve(mesh.anywhere), mesh.freedom
+        self.together = self.free if mesh.freedom is None else self.free & ~mesh.freedom.curved
         stuck = mesh.stuck(threads)
         fixed = Judged(self.stars, stuck)
         inverted = fixed.check(self.points, threads)[0]
@@ -329,11 +330,11 @@ class Run:
             embedded = embedding(points, stars, near, self.threads, self.team.freedom)
             yield Reach(start, self.max_move).drawn_in(embedded)
 
-        yield from self._of_whole(compute, self.points, self.first[0], self.near)
+        yield from self._of_whole(compute, self.points, self.first[0], self.near & self.together)
 
     def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
-        if self.max_move < math.inf or self.left or not self._count(self.free):
+        if self.max_move < math.inf or self.left or not self._count(self.together):
             return
         angles = self._angles(self.points)
         smallest = self._least(angles)
@@ -347,7 +348,7 @@ class Run:
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
             yield shaped(points, stars, free, aims, self.threads, most, self.team.freedom)
 
-        yield from self._of_whole(compute, self.points, self._smoothed(phase))
+        yield from self._of_whole(compute, self.points, self._smoothed(phase) & self.together)
 
     def _even(self) -> Iterator[Array]:
         """Yield the points with even sizes and then the best shape, if smallest and mean are larger."""
@@ -360,7 +361,7 @@ class Run:
         mean = total / ANGLE_STEPS / self.count
         aims = Goal(math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT, 0.0, max(self.min_measure, 0.0))
         compute = partial(even.evened_where_poor, smallest, mean, aims, self.threads, self.team.freedom)
-        for points in self._of_whole(compute, self.points, self.free):
+        for points in self._of_whole(compute, self.points, self.together):
             there = self._angles(points)
             if math.sin(self._least(there)) > smallest and self.team.total(self._steps(np.sin(there))) > total:
                 yield points
@@ -474,15 +475,22 @@ class Run:
         compute = partial(getattr(layers if phase.layers else towards, phase.to_reference), self.max_move, self.threads)
         reference = () if self.reference is None or phase.layers else (self.reference,)
         if phase.layers or phase.to_reference == "follow":
-            return self._of_whole(compute, self.points, self.first[0], *reference, self.inside)
+            return self._of_whole(compute, self._slid_back(), self.first[0], *reference, self.inside)
         compute = partial(compute, freedom=self.team.freedom)
-        return self._of_whole(compute, self.points, self.first[0], *reference, self.free)
+        return self._of_whole(compute, self.points, self.first[0], *reference, self.together)
+
+    def _slid_back(self) -> Array:
+        """Return the points with those on surfaces and curves where they are in the reference, if that is in reach."""
+        if self.reference is None or self.freedom is None:
+            return self.points
+        near = np.linalg.norm(self.reference - self.first[0], axis=1) <= self.max_move
+        return np.where((self.free & self.freedom.curved & near)[:, None], self.reference, self.points)
 
     def _minimisations(self, phase: Phase) -> Iterator[Array]:
         from meshfix_cli.solve.foldover import minimisations_in_regions
 
         compute = partial(minimisations_in_regions, phase.rings, self.max_move, self.threads, self.team.freedom)
-        return self._of_whole(compute, self.points, self.first[0], self.free, self._broken())
+        return self._of_whole(compute, self.points, self.first[0], self.together, self._broken())
 
     def _of_whole(self, compute: Callable[..., Iterator[Array]], *values: NDArray[Any]) -> Iterator[Array]:
         """Yield what `Team.of_whole` does, with those that slide where they may be: rounding leads off a plane."""

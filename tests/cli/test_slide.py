@@ -9,11 +9,14 @@ import meshio
 import numpy as np
 import pytest
 from commands import run
-from geometries import grid
+from geometries import grid, shell
+from meshes import sliding_on_curves
 from numpy.typing import NDArray
 from places import SAMPLES
 
+from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.reading import read
+from meshfix_cli.solve.perturb import perturb
 
 
 def box(path: Path, *, line: bool = False, regions: bool = False, hold: bool = False) -> Path:
@@ -129,3 +132,54 @@ def test_a_batch_slides(tmp_path: Path) -> None:
     run("batch", "--slide", "flat", "--smooth", "best", SAMPLES / "bracket_tangled.vtk", "--output-dir", out)
     report = json.loads(run("quality", "--json", out / "bracket_tangled.vtk").stdout)
     assert report["min_angle"] > 20  # held, 17.3 is the ceiling
+
+
+def written(path: Path, mesh: Mesh) -> Path:
+    meshio.Mesh(mesh.points, [("tetra", mesh.topology.simplices)]).write(path)
+    return path
+
+
+def spheres(path: Path) -> tuple[Path, Path]:
+    """The space between two spheres in a file, and the same with its boundary tangled on these."""
+    valid = Mesh.build(*shell())
+    bad, _ = perturb(sliding_on_curves(valid), 25, valid.mean_edge_length())
+    return written(path / "clean.vtk", valid), written(path / "bad.vtk", bad)
+
+
+def test_a_boundary_tangled_on_its_surfaces_comes_back(tmp_path: Path) -> None:
+    (clean, bad), good = spheres(tmp_path), tmp_path / "good.vtk"
+    report = json.loads(run("untangle", "--slide", "curved", "--reference", clean, "--json", bad, good).stdout)
+    assert report["sliding"] == {"lines": 0, "planes": 0, "curves": 0, "surfaces": 324}
+    assert report["shape"]["folds"] == 0
+    assert report["shape"]["hausdorff"] == pytest.approx(0, abs=1e-6)
+    assert np.abs(points_of(good) - points_of(clean)).max() < 1e-3
+    done = run("untangle", "--slide", "curved", "--sweeps", "3", "--smooth", "0", bad, good, code=3)
+    said = " ".join(done.stdout.decode().split())
+    assert "is its own reference: vertices there stay" in said
+
+
+def test_a_boundary_that_has_left_the_reference_is_not_taken_back(tmp_path: Path) -> None:
+    (clean, _), moved = spheres(tmp_path), tmp_path / "moved.vtk"
+    mesh = Mesh.build(*shell())
+    outer = np.linalg.norm(mesh.points, axis=1) > 0.99
+    pushed = written(tmp_path / "pushed.vtk", mesh.with_points(np.where(outer[:, None], 0.6, 1.0) * mesh.points))
+    run("untangle", "--slide", "curved", "--reference", clean, pushed, moved)
+    assert np.array_equal(points_of(moved)[outer], points_of(pushed)[outer])
+
+
+def test_the_shape_is_kept_as_well_as_it_is_asked_for(tmp_path: Path) -> None:
+    out, far = tmp_path / "out.vtk", {}
+    for bound in ("0.01h", "0.1h"):
+        options = "--slide", "curved", "--max-deviation", bound, "--smooth", "best", "--json"
+        report = json.loads(run("untangle", *options, SAMPLES / "bracket_tangled.vtk", out).stdout)
+        assert report["sliding"] == {"lines": 38, "planes": 364, "curves": 150, "surfaces": 438}
+        assert report["min_angle"] > 23  # 22.214 is the ceiling of what is flat
+        assert abs(report["shape"]["size"]) < 5e-3
+        far[bound] = report["shape"]["hausdorff"]
+    assert 0 < far["0.01h"] < far["0.1h"]
+    said = " ".join(run("untangle", "--slide", "curved", SAMPLES / "plate_tangled.vtk", out).stdout.decode().split())
+    assert "(52 along lines, 28 along curves)" in said
+    assert "note: the boundary is within 0.0" in said
+    smaller = "--slide", "curved", "--feature-angle", "5"
+    report = json.loads(run("untangle", *smaller, "--json", SAMPLES / "plate_tangled.vtk", out).stdout)
+    assert report["sliding"] == {"lines": 52, "planes": 0}

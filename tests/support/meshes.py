@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.curved import Smooth
 from meshfix_cli.mesh.freedom import constraints_of, freedom_of
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.solve.perturb import perturb
@@ -25,6 +26,14 @@ def sliding(mesh: Mesh, regions: NDArray[np.int64] | None = None) -> Mesh:
     """Let all of the flat boundary slide."""
     points = mesh.along_curve(mesh.points)
     freedom = freedom_of(points, constraints_of(mesh.topology, points, regions))
+    return mesh.sliding(freedom, np.zeros(len(mesh.points), dtype=bool))
+
+
+def sliding_on_curves(mesh: Mesh, bound: float = 0.03, feature_angle: float = 40.0) -> Mesh:
+    """Let all of the boundary slide that is smooth; the bound in mean edge lengths."""
+    points = mesh.along_curve(mesh.points)
+    smooth = Smooth(feature_angle, bound * mesh.mean_edge_length())
+    freedom = freedom_of(points, constraints_of(mesh.topology, points), smooth)
     return mesh.sliding(freedom, np.zeros(len(mesh.points), dtype=bool))
 
 

@@ -21,7 +21,7 @@ import elements
 import generate
 from building import Blocks
 from layered import Points, body_of, layered, left_behind
-from meshes import sliding, tangle, with_an_inverted_fixed_simplex
+from meshes import sliding, sliding_on_curves, tangle, with_an_inverted_fixed_simplex
 
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.reference import reference_points
@@ -69,6 +69,10 @@ METHODS = {
     "slidingbest": Method(smooth="best"),
     "slidingFF": Method("FF"),
     "slidingonlyinvalid": Method(only_invalid=True),
+    "curved": Method(),
+    "curvedbest": Method(smooth="best"),
+    "curvednear": Method(max_move=REACH),
+    "curvedreference": Method(),
     "layers": Method(),
     "reference": Method(),
 }
@@ -92,6 +96,8 @@ def mesh_of(case: str) -> Mesh:
         return tangle(Mesh.build(*generate.plate(0.18)))
     if case.startswith("sliding"):
         return tangle(sliding(Mesh.build(*generate.bracket(0.06, 10))), 25, 1)
+    if case.startswith("curved"):
+        return tangle(sliding_on_curves(Mesh.build(*generate.bracket(0.06, 10))), 25, 1)
     if case.endswith("FF"):
         return tangle(Mesh.build(*generate.bracket(0.18, 8)), 25, 2)
     if case == "layers":
@@ -118,6 +124,8 @@ def reference_of(case: str, mesh: Mesh) -> Points | None:
     """Return where the vertices of a mesh were before its boundary moved, where that is the case."""
     if not case.endswith("reference"):
         return None
+    if case == "curvedreference":
+        return reference_points(mesh, Mesh.build(*generate.bracket(0.06, 10)))
     made = ELEMENTS["solids"]() if case == "solidsreference" else generate.bracket(0.08, 10)
     return reference_points(mesh, Mesh.build(*made))
 

@@ -302,11 +302,51 @@ std::vector<T> copied(const Vector<const T>& values) {
     return {values.data(), values.data() + values.size()};
 }
 
+template <class T>
+std::vector<T> copied(const Matrices<const T>& values) {
+    return {values.data(), values.data() + values.size()};
+}
+
 void init_freedom(Freedom* self, const Vector<const std::int32_t>& frame, const Vector<const std::uint8_t>& directions,
                   const Matrices<const double>& axes, const Vector<const std::int32_t>& offsets,
-                  const Vector<const std::int32_t>& neighbours) {
-    new (self) Freedom{copied(frame), copied(directions), {axes.data(), axes.data() + axes.size()}, copied(offsets),
-                       copied(neighbours)};
+                  const Vector<const std::int32_t>& neighbours, const Reference* reference) {
+    new (self) Freedom{copied(frame), copied(directions), copied(axes), copied(offsets), copied(neighbours), reference};
+}
+
+void keep_near(Freedom& self, const Vector<const std::int32_t>& offsets, const Matrix<const std::int32_t>& around,
+               double bound) {
+    self.around_offsets = copied(offsets);
+    self.around = {around.data(), around.data() + around.size()};
+    self.bound2 = bound * bound;
+}
+
+void init_reference(Reference* self, const Matrices<const double>& corners, const Matrices<const double>& ways,
+                    const Vector<const std::int32_t>& first, const Vector<const std::uint8_t>& directions) {
+    new (self) Reference(static_cast<int>(corners.shape(2)), copied(corners), copied(ways), copied(first),
+                         copied(directions));
+}
+
+// For points (q, D) each on its shape (q,): the nearest positions (q, D), and the distances (q,) from the pieces themselves.
+auto nearest_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
+                int threads) {
+    const std::size_t count = points.shape(0), d = points.shape(1);
+    if (static_cast<int>(d) != self.dimension() || shapes.shape(0) != count)
+        throw nb::value_error("the points are of another reference");
+    std::vector<double> there(count * d), distances(count);
+    with_dimension(d, [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(static_cast<std::int64_t>(count), 1024, threads,
+                       [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+                           for (std::int64_t i = begin; i < end; ++i) {
+                               const Foot<D> foot = self.foot<D>(shapes.data()[i], load<D>(points.data() + i * D));
+                               const Vec<D> x = self.rounded<D>(shapes.data()[i], foot);
+                               std::copy(x.begin(), x.end(), there.begin() + i * D);
+                               distances[i] = std::sqrt(foot.distance2);
+                           }
+                       });
+        return 0;
+    });
+    return std::make_pair(to_numpy(std::move(there), d), to_numpy(std::move(distances)));
 }
 
 // Numbers things (n,) so that those which pairs (p, 2) join have one number, by the first of each.
@@ -330,7 +370,12 @@ auto joined_py(const Matrix<const std::int32_t>& pairs, std::int32_t n) {
 void bind_mesh(nb::module_& m) {
     nb::class_<Freedom>(m, "Freedom")
         .def("__init__", &init_freedom, "frame"_a.noconvert(), "directions"_a.noconvert(), "axes"_a.noconvert(),
-             "offsets"_a.noconvert(), "neighbours"_a.noconvert());
+             "offsets"_a.noconvert(), "neighbours"_a.noconvert(), "reference"_a = nb::none(), nb::keep_alive<1, 7>())
+        .def("keep_near", &keep_near, "offsets"_a.noconvert(), "around"_a.noconvert(), "bound"_a);
+    nb::class_<Reference>(m, "Reference")
+        .def("__init__", &init_reference, "corners"_a.noconvert(), "ways"_a.noconvert(), "first"_a.noconvert(),
+             "directions"_a.noconvert())
+        .def("nearest", &nearest_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a);
     m.def("joined", &joined_py, "pairs"_a.noconvert(), "n"_a);
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);

@@ -1,14 +1,20 @@
-// Where vertices may go: anywhere, or from where they came along one or two axes, in a line or a plane.
+// Where vertices may go: anywhere, or from where they came along one or two axes, in a line or a plane, or on the curves and
+// surfaces of a reference.
 //
-// frame (n)               the line or plane of each; -1: it may go anywhere
+// frame (n)               the line or plane of each, and behind these its curve or surface; -1: it may go anywhere
 // directions (f)          how many directions each of these has, 1 or 2
-// axes (f, D, D)          orthonormal rows, of which those directions are the first
-// offsets (n+1), neighbours   of those that do not go anywhere: their neighbours in their line or plane; or none
+// axes (f, D, D)          orthonormal rows, of which those directions are the first; of lines and planes alone
+// offsets (n+1), neighbours   of those that do not go anywhere: their neighbours in what they slide in; or none
+// reference               null: there are only lines and planes
+// around_offsets (n+1), around (r, 3)   of those on a reference: the other end of an edge and -1, or the other corners of a
+//                         triangle, and the shape from which these may not go far
+// bound2                  the square of how far that is
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
+#include "mesh/reference.hpp"
 #include "mesh/simplex.hpp"
 
 namespace meshfix {
@@ -18,8 +24,16 @@ struct Freedom {
     std::vector<std::uint8_t> directions;
     std::vector<double> axes;
     std::vector<std::int32_t> offsets, neighbours;
+    const Reference* reference = nullptr;
+    std::vector<std::int32_t> around_offsets{}, around{};
+    double bound2 = 0.0;
 
     bool anywhere(std::int64_t v) const { return frame[v] < 0; }
+
+    // That of a vertex on the reference; negative: it is not on one.
+    std::int32_t shape(std::int64_t v) const {
+        return reference == nullptr ? -1 : frame[v] - static_cast<std::int32_t>(directions.size() - reference->shapes());
+    }
 };
 
 // The directions of one vertex.
@@ -30,12 +44,30 @@ struct Directions {
     Vec<D> anchor{};
     std::array<bool, D> kept{};  // coordinates that no axis changes: they keep their bits
     bool aligned = false;        // the axes are those of the coordinates
+    const Reference* reference = nullptr;  // null: it is on none
+    std::int32_t shape = -1;
 
     bool anywhere() const { return count == D; }
+    bool curved() const { return reference != nullptr; }
 
-    // `at`: a position in its line or plane.
+    void set_anywhere() {
+        count = D;
+        reference = nullptr;
+    }
+
+    // `start`: a position in its line or plane; `here`: where it is.
+    void set(const Freedom& freedom, std::int64_t v, const Vec<D>& start, const Vec<D>& here) {
+        shape = freedom.shape(v);
+        if (shape < 0) return set(freedom, v, start);
+        count = freedom.directions[freedom.frame[v]];
+        reference = freedom.reference;
+        axes = reference->axes<D>(shape, here);
+        kept.fill(false);
+    }
+
     void set(const Freedom& freedom, std::int64_t v, const Vec<D>& at) {
         count = freedom.directions[freedom.frame[v]];
+        reference = nullptr;
         anchor = at;
         const double* rows = freedom.axes.data() + static_cast<std::int64_t>(freedom.frame[v]) * D * D;
         kept.fill(true);
@@ -58,6 +90,7 @@ struct Directions {
 
     // The nearest position, from the anchor: a step from the last one would leave the plane bit by bit.
     Vec<D> onto(const Vec<D>& p) const {
+        if (curved()) return reference->onto<D>(shape, p);
         return anywhere() ? p : with_kept(aligned ? p : anchor + along(p - anchor));
     }
 

@@ -8,7 +8,7 @@
 // position        the free vertex
 // radius          the distance of the farthest neighbour; 0: all neighbours are in one point
 // directions      in which the vertex may go
-// centre          where the mean of the neighbours draws it: the origin, or the place for it in the vertex's line or plane
+// centre          where the mean of the neighbours draws it: the origin, or the place for it in what the vertex slides in
 #pragma once
 
 #include <cmath>
@@ -52,7 +52,7 @@ inline Vec<D> centroid(const StarsView& stars, const double* points, std::int64_
     return mean_of<D>(stars.neighbours + begin, end - begin, points);
 }
 
-// Of those in the line or plane of v, there.
+// Of those in what v slides in, there.
 template <int D>
 inline Vec<D> centroid(const Freedom& freedom, const Directions<D>& directions, const double* points, std::int64_t v) {
     const std::int32_t begin = freedom.offsets[v], end = freedom.offsets[v + 1];
@@ -85,10 +85,10 @@ struct Star {
     void gather(const StarsView& stars, const Freedom* freedom, const double* anchors, const double* points,
                 std::int64_t v) {
         gather(stars, points, v);
-        directions.count = D;
+        directions.set_anywhere();
         centre = {};
         if (freedom == nullptr || freedom->anywhere(v)) return;
-        directions.set(*freedom, v, load<D>(anchors + v * D));
+        directions.set(*freedom, v, load<D>(anchors + v * D), load<D>(points + v * D));
         centre = to_local(centroid<D>(*freedom, directions, points, v));
     }
 

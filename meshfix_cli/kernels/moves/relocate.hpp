@@ -72,16 +72,64 @@ struct Relocation {
         }
     }
 
-    // The last point on the way from the position to x, halved a few times, where no element is lost that was valid inside.
+    // The last point on the way from the position to x, halved a few times, where no element is lost that was valid inside,
+    // and facets stay near the reference.
     Vec<D> guarded(std::int64_t v, const Vec<D>& x) const {
-        if constexpr (D == 2) return x;
-        if (stars.elements == nullptr) return x;
+        const bool curved = star.directions.curved(), has_inside = D == 3 && stars.elements != nullptr;
+        if (!curved && !has_inside) return x;
+        // On a surface a place half-way is not as good as both ends for being between them.
+        const double least = curved ? std::min(min_sine2<D>(star, x, 0.0), min_sine2<D>(star, star.position, 0.0)) : 0.0;
         Vec<D> trial = x;
         for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
-            if (loses_nothing(v, trial)) return trial;
+            const bool good = !curved || (is_near(v, trial) && min_sine2<D>(star, trial, least * (1.0 - SAME_SINE2)) > 0.0);
+            if (good && (!has_inside || loses_nothing(v, trial))) return trial;
             trial = star.snap(star.position + 0.5 * (trial - star.position));
         }
         return star.position;
+    }
+
+    // Where a vertex comes to be that is drawn to x: on a reference, halved a few times, where the smallest determinant is no
+    // smaller than `least`; and while the star is valid, facets stay near the reference.
+    Vec<D> reached(std::int64_t v, const Vec<D>& x, double least) const {
+        if (!star.directions.curved()) return star.landing(x);
+        const bool valid = star.valid(star.position);
+        Vec<D> trial = star.snap(x);
+        for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
+            const bool near = valid ? is_near(v, trial) : is_in_reach(v, star.to_global(trial));
+            if (near && !(min_det(trial) < least)) return star.to_global(trial);
+            trial = star.snap(star.position + 0.5 * (trial - star.position));
+        }
+        return load<D>(points + v * D);
+    }
+
+    // Whether a vertex on the reference may be at x: in reach, with the facets around it near their shapes, or nearer than
+    // they are.
+    bool is_near(std::int64_t v, const Vec<D>& x) const {
+        const Vec<D> there = star.to_global(x);
+        if (!is_in_reach(v, there)) return false;
+        const double deviation2 = deviation2_at(v, there);
+        return deviation2 <= parameters.freedom->bound2 || deviation2 <= deviation2_at(v, load<D>(points + v * D));
+    }
+
+    // The largest distance^2 of the middles of edges and triangles around v, if it is at x, from their shapes.
+    double deviation2_at(std::int64_t v, const Vec<D>& x) const {
+        const Freedom& freedom = *parameters.freedom;
+        double largest = 0.0;
+        const auto look = [&](std::int32_t shape, const Vec<D>& p) {
+            largest = std::max(largest, freedom.reference->template foot<D>(shape, p).distance2);
+        };
+        for (std::int32_t i = freedom.around_offsets[v]; i < freedom.around_offsets[v + 1]; ++i) {
+            const std::int32_t* row = freedom.around.data() + 3 * static_cast<std::int64_t>(i);
+            const Vec<D> a = load<D>(points + static_cast<std::int64_t>(row[0]) * D);
+            look(row[2], 0.5 * (x + a));
+            if (row[1] >= 0) look(row[2], (1.0 / 3.0) * (x + a + load<D>(points + static_cast<std::int64_t>(row[1]) * D)));
+        }
+        return largest;
+    }
+
+    bool is_in_reach(std::int64_t v, const Vec<D>& x) const {
+        const double reach = parameters.max_move;
+        return !(reach < INFINITY) || norm2(x - load<D>(parameters.start + v * D)) <= reach * reach;
     }
 
     bool loses_nothing(std::int64_t v, const Vec<D>& x) const {
@@ -107,7 +155,7 @@ struct Relocation {
             for_each_affine(v, [&](double value, const Vec<D>& gradient) { functions.push_back({value, gradient}); });
             for (const bool heights : {true, false}) {
                 const bool solved = program.solve(star, functions, heights);
-                if (solved && (program.smallest > 0.0 || !heights)) return store(v, star.landing(program.position));
+                if (solved && (program.smallest > 0.0 || !heights)) return store(v, optimum(v));
             }
         }
         return false;
@@ -133,7 +181,7 @@ struct Relocation {
     }
 
     Vec<D> mean_of_neighbours(std::int64_t v) {
-        star.directions.count = D;
+        star.directions.set_anywhere();
         if (parameters.freedom == nullptr || parameters.freedom->anywhere(v)) return centroid<D>(stars, points, v);
         star.directions.set(*parameters.freedom, v, load<D>(parameters.start + v * D));
         return centroid<D>(*parameters.freedom, star.directions, points, v);
@@ -174,19 +222,24 @@ struct Relocation {
     // To the optimum of the linear programme. Also where the smallest measure stays the same: of many optima the
     // move to another is what frees collapsed clusters in a later sweep.
     bool untangle(std::int64_t v) {
-        return program.solve(star, false) && store(v, star.landing(program.position));
+        return program.solve(star, false) && store(v, optimum(v));
+    }
+
+    // That of the programme, as near as the vertex may go.
+    Vec<D> optimum(std::int64_t v) const {
+        return reached(v, program.position, star.directions.curved() ? min_det(star.position) : 0.0);
     }
 
     // The largest smallest height where that makes the star valid, else the largest smallest measure: heights alone
     // diverge on hard tangles.
     bool untangle_heights(std::int64_t v) {
         if (!program.solve(star, true) || !(program.smallest > 0.0)) return untangle(v);
-        return store(v, star.landing(program.position));
+        return store(v, optimum(v));
     }
 
     // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
     bool combined_untangle(std::int64_t v) {
-        const bool moved = store(v, star.directions.anywhere() ? star.origin : star.landing(star.centre));
+        const bool moved = store(v, star.directions.anywhere() ? star.origin : reached(v, star.centre, -INFINITY));
         star.position = star.to_local(load<D>(points + v * D));
         return (star.valid(star.position) ? false : untangle(v)) || moved;
     }
@@ -211,7 +264,8 @@ struct Relocation {
         if (!(quality > 0.0)) return false;
         const auto reachable = [&](const Vec<D>& x) {
             const Vec<D> there = star.landing(x);
-            return star.to_local(parameters.max_move < INFINITY ? within_reach(v, there) : there);
+            const bool cut = parameters.max_move < INFINITY && !star.directions.curved();
+            return star.to_local(cut ? within_reach(v, there) : there);
         };
         return take(v, star.roles.empty() ? improve_mean<D, MeanRatio<D>>(star, quality, floor, reachable)
                                           : improve_mean<D, ElementRatio<D>>(star, quality, floor, reachable));
@@ -226,6 +280,7 @@ struct Relocation {
         if (share < LEAST_SHARE) return false;
         const Vec<D> x = share == 1.0 ? target : star.snap(star.position + share * (target - star.position));
         if (stars.elements != nullptr && !loses_nothing(v, x)) return false;
+        if (star.directions.curved() && !is_near(v, x)) return false;
         return star.valid(x) && store(v, share == 1.0 ? start : star.to_global(x));
     }
 
@@ -266,11 +321,12 @@ struct Relocation {
 
     void relocate(Move move, std::int64_t v, Counts& counts) {
         ++counts.visited;
-        if (move == Move::laplacian) {  // nearly all move: all stay due
+        const bool curved = parameters.freedom != nullptr && parameters.freedom->shape(v) >= 0;
+        if (move == Move::laplacian && !curved) {  // nearly all move: all stay due
             counts.moved += place(v, mean_of_neighbours(v));
             return;
         }
-        states[v] = DONE;
+        if (move != Move::laplacian) states[v] = DONE;
         star.gather(stars, parameters.freedom, parameters.start, points, v);
         switch (move) {
             case Move::untangle: counts.moved += untangle(v); break;
@@ -282,7 +338,7 @@ struct Relocation {
             case Move::raise_smallest: counts.moved += raise_smallest(v); break;
             case Move::come_back: counts.moved += come_back(v); break;
             case Move::untangle_coefficients: counts.moved += untangle_coefficients(v); break;
-            case Move::laplacian: break;
+            case Move::laplacian: counts.moved += place(v, reached(v, star.centre, -INFINITY)); break;
         }
     }
 };

@@ -29,13 +29,13 @@ from meshfix_cli.report.facts import (
     processes,
     quality_rows,
     required,
-    sliding,
     title,
     verdict,
 )
 from meshfix_cli.report.figures import Cells, Figures, Scene, Worst, number_of
 from meshfix_cli.report.page import charts
 from meshfix_cli.report.plain import plain
+from meshfix_cli.report.sliding import sliding
 
 FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
 PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")

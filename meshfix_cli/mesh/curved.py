@@ -1,0 +1,333 @@
+"""Smooth surfaces and curves of what keeps a mesh's shape, and the vertices that may slide on and along them.
+
+A vertex may slide on the surface of its facets where none of their edges is a feature, and along a curve of two
+features that go on in each other. Corners have no place where they might go.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.patches import Constraints, Sides, edges_of, normals_of, numbered, of_two, sides_of
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Numbers = NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """What counts as smooth, and how exactly it is kept.
+
+    Attributes
+    ----------
+    feature_angle : float
+        Degrees between the normals of facets, or the directions of edges, that meet at a feature.
+    bound : float
+        How far from the shape the middles of edges and triangles may be, in model units.
+    """
+
+    feature_angle: float
+    bound: float
+
+    @property
+    def cosine(self) -> float:
+        """That of the feature angle."""
+        return math.cos(math.radians(self.feature_angle))
+
+
+@dataclass(frozen=True, eq=False)
+class Shapes:
+    """Surfaces and curves as pieces: triangles, and segments between two vertices.
+
+    Attributes
+    ----------
+    vertices : (p, d) int32
+        The corners of each piece, those of a shape one behind the other; of a segment in space the last comes twice.
+    corners, ways : (p, d, d) float64
+        Where they are in the reference; and unit normals of surfaces, tangents of curves, there.
+    first : (s+1,) int32
+        Where the pieces of each shape begin, and their number.
+    directions : (s,) uint8
+        2: a surface; 1: a curve.
+    offsets : (k+1,) int32
+    around : (r, 3) int32
+        Of each vertex that slides, at its offset: the other end of an edge and -1, or the other corners of a triangle,
+        and their shape.
+    bound : float
+        See `Smooth`.
+    folds : int
+        How often facets of inverted elements are folded back upon their neighbours: a tangled boundary is no reference.
+    """
+
+    vertices: Numbers
+    corners: Array
+    ways: Array
+    first: Numbers
+    directions: NDArray[np.uint8]
+    offsets: Numbers
+    around: Numbers
+    bound: float
+    folds: int
+
+    def kernel(self, corners: Array | None = None) -> kernels.Reference:
+        """Return the same for the kernels, maybe with other corners; it is not kept: processes send their parts."""
+        return kernels.Reference(self.corners if corners is None else corners, self.ways, self.first, self.directions)
+
+    def part(self, vertices: Numbers, number: Numbers, own: int) -> Shapes:
+        """Return that of a part of the mesh, see `Freedom.part`, with all pieces; new numbers of vertices (k,)."""
+        counts = np.diff(self.offsets)[vertices]
+        counts[own:] = 0
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        places = np.arange(offsets[-1]) + np.repeat(self.offsets[vertices] - offsets[:-1], counts)
+        around = self.around[places]
+        around[:, :2] = np.where(around[:, :2] < 0, -1, number[around[:, :2]])
+        same = self.vertices, self.corners, self.ways, self.first, self.directions
+        return Shapes(*same, offsets, around, self.bound, self.folds)
+
+    def hausdorff(self, points: Array, threads: int = 1) -> float:
+        """Return how far the shapes with their corners at points (k, d) are from the reference, at most, both ways.
+
+        That is found at vertices, and at the middles of edges and triangles.
+        """
+        shape = np.repeat(np.arange(len(self.directions), dtype=np.int32), np.diff(self.first))
+        moved, largest = points[self.vertices], 0.0
+        for here, there in ((moved, self.corners), (self.corners, moved)):
+            other = self.kernel(np.ascontiguousarray(there))
+            middles = (here + np.roll(here, 1, axis=1)) / 2
+            on_surface = self.directions[shape][:, None] == 2
+            centres = np.where(on_surface, here.mean(axis=1), middles[:, 1])
+            for some in (centres, *np.swapaxes(here, 0, 1), *np.swapaxes(middles, 0, 1)):
+                far = other.nearest(np.ascontiguousarray(some), shape, threads)[1]
+                largest = max(largest, float(far.max(initial=0)))
+        return largest
+
+
+@dataclass(frozen=True, eq=False)
+class Curved:
+    """Vertices that slide on surfaces and curves.
+
+    Attributes
+    ----------
+    shape : (k,) int32
+        That of each vertex of the connectivity; -1: it slides on none.
+    pairs : (p, 2) int32
+        Each of these and a neighbour on its surface or curve.
+    shapes : Shapes
+    """
+
+    shape: Numbers
+    pairs: Numbers
+    shapes: Shapes
+
+
+def curved_of(points: Array, given: Constraints, smooth: Smooth, flat: NDArray[np.uint8]) -> Curved:
+    """Find the vertices that slide on surfaces and curves.
+
+    Parameters
+    ----------
+    points : (k, d) float64
+        Of the reference, in the order of the connectivity.
+    given : Constraints
+    smooth : Smooth
+    flat : (k,) uint8
+        In how many directions vertices slide in lines and planes already. Those in a line that is no feature, such as
+        an edge of a prism of many sides, go onto the surface.
+    """
+    if points.shape[1] == 2:
+        return _Plane(points, given, smooth).found(flat)
+    return _Solid(points, given, smooth).found(flat)
+
+
+class _Shaped:
+    """What is found about facets, how smoothly they meet, and curves of edges."""
+
+    def __init__(self, points: Array, given: Constraints, smooth: Smooth) -> None:
+        self.points, self.given, self.smooth = points, given, smooth
+        normals, _ = normals_of(points, given.facets, 0.0)
+        self.units = _unit(normals)
+        self.folds = 0
+
+    def meet_smoothly(self, pairs: Numbers) -> Mask:
+        """(p,) bool: facets (p, 2) that are of one label and turn by less than the feature angle."""
+        one, other = pairs.T
+        labels, inverted = self.given.labels, self.given.inverted
+        cosine, same = (self.units[one] * self.units[other]).sum(axis=1), labels[one] == labels[other]
+        self.folds = int((same & (cosine < -abs(self.smooth.cosine)) & (inverted[one] | inverted[other])).sum())
+        return np.asarray(same & (cosine >= self.smooth.cosine))
+
+    def tangents(self, edges: Numbers, vertices: Numbers, pairs: Numbers) -> Array:
+        """Return the unit tangents (e, 2, d) of curves at the ends of edges (e, 2), which are joined at vertices (v,).
+
+        They are those of a parabola through the three vertices; at the end of a curve as much on the other side of the
+        edge as at its other end.
+        """
+        ways = self.points[edges[:, 1]] - self.points[edges[:, 0]]
+        known = np.zeros_like(self.points)
+        there = self.points[edges[pairs].sum(axis=2) - vertices[:, None]] - self.points[vertices][:, None]
+        length = np.linalg.norm(there, axis=2, keepdims=True)
+        unit = _unit(there)
+        known[vertices] = _unit(unit[:, 1] * length[:, 0] - unit[:, 0] * length[:, 1])
+        along = _unit(ways)
+        tangents = known[edges]
+        tangents *= np.where((tangents * along[:, None]).sum(axis=2) < 0, -1.0, 1.0)[:, :, None]
+        ends = ~(tangents != 0).any(axis=2)
+        other = tangents[:, ::-1]
+        mirrored = 2 * (other * along[:, None]).sum(axis=2, keepdims=True) * along[:, None] - other
+        mirrored = np.where((other != 0).any(axis=2, keepdims=True), mirrored, along[:, None])
+        return np.where(ends[:, :, None], mirrored, tangents)
+
+
+class _Plane(_Shaped):
+    """Of a plane mesh: its facets are the edges, and meet at vertices."""
+
+    def found(self, flat: NDArray[np.uint8]) -> Curved:
+        facets, k = self.given.facets, len(self.points)
+        vertices, pairs = of_two(facets.ravel(), np.repeat(np.arange(len(facets), dtype=np.int32), 2), k)
+        good = self.meet_smoothly(pairs)
+        vertices, pairs = vertices[good], pairs[good]
+        chain = kernels.joined(np.ascontiguousarray(pairs), len(facets))
+        shape = np.full(k, -1, dtype=np.int32)
+        mine = flat[vertices] == 0
+        number, curves = numbered(chain[pairs[mine, 0]], len(facets))
+        shape[vertices[mine]] = number[chain[pairs[mine, 0]]]
+        tangents = self.tangents(facets, vertices, pairs)
+        pieces = _Pieces(facets, tangents, number[chain])
+        edges = _both_ways(facets)
+        around = np.column_stack([edges, np.full(len(edges), -1), np.tile(number[chain], 2)]).astype(np.int32)
+        return _curved(shape, edges, around, [pieces], [1] * curves, self)
+
+
+@dataclass(frozen=True, eq=False)
+class _Pieces:
+    """Pieces (p, w) of shapes: their ways (p, w, d), and the shape of each, -1: of none that is needed."""
+
+    vertices: Numbers
+    ways: Array
+    shape: Numbers
+
+
+class _Solid(_Shaped):
+    """Of a solid: facets meet at edges, and those that are features meet at vertices."""
+
+    def __init__(self, points: Array, given: Constraints, smooth: Smooth) -> None:
+        super().__init__(points, given, smooth)
+        self.sides: Sides = sides_of(given.facets)
+        self.edges, here, self.count, is_line = edges_of(self.sides, given.lines)
+        pair = np.flatnonzero((self.count == 2) & ~is_line)
+        first = np.concatenate([[0], np.cumsum(self.count)])[pair]
+        two = np.stack([here[first], here[first + 1]], axis=1)
+        pairs = self.sides.owners[two]
+        good = self.meet_smoothly(pairs)
+        self.is_feature = np.ones(len(self.edges), dtype=bool)
+        self.is_feature[pair[good]] = False
+        self.patch = kernels.joined(np.ascontiguousarray(pairs[good]), len(given.facets))
+        ends = self.sides.ends[two[good]]
+        corners = len(self.sides.corners)
+        self.fan = kernels.joined(np.concatenate([ends[:, :, 0], ends[:, :, 1]]), corners)
+        whole = self.fan == np.arange(corners)
+        self.fans = np.bincount(self.sides.corners[whole], minlength=len(points))
+
+    @cached_property
+    def curves(self) -> tuple[Numbers, Numbers, Numbers]:
+        """The features (e, 2), the vertices (v,) at which two go on in each other, and these (v, 2)."""
+        features, facets = self.edges[self.is_feature], self.count[self.is_feature]
+        which = np.repeat(np.arange(len(features), dtype=np.int32), 2)
+        vertices, pairs = of_two(features.ravel(), which, len(self.points))
+        ways = self.points[features[pairs].sum(axis=2) - vertices[:, None]] - self.points[vertices][:, None]
+        unit = _unit(ways)
+        good = -(unit[:, 0] * unit[:, 1]).sum(axis=1) >= self.smooth.cosine
+        # Each side reaches from one feature to the other; a fan that does not is a cone of its own.
+        good &= 2 * self.fans[vertices] == facets[pairs].sum(axis=1)
+        return features, vertices[good], pairs[good]
+
+    def found(self, flat: NDArray[np.uint8]) -> Curved:
+        k, corners, owners = len(self.points), self.sides.corners, self.sides.corner_owners
+        features, vertices, pairs = self.curves
+        on_surface = (self.fans == 1) & (flat < 2)
+        on_surface[features] = False
+        on_curve = np.zeros(k, dtype=bool)
+        on_curve[vertices[flat[vertices] == 0]] = True
+        needed = self.patch[owners[(on_surface | on_curve)[corners]]]
+        number, surfaces = numbered(needed, len(self.given.facets))
+        shape = np.full(k, -1, dtype=np.int32)
+        mine = on_surface[corners]
+        shape[corners[mine]] = number[self.patch[owners[mine]]]
+        chain = kernels.joined(np.ascontiguousarray(pairs), len(features))
+        there = on_curve[vertices]
+        of_curve, curves = numbered(chain[pairs[there, 0]], len(features))
+        of_curve = np.where(of_curve < 0, -1, of_curve + surfaces).astype(np.int32)
+        shape[vertices[there]] = of_curve[chain[pairs[there, 0]]]
+        triangles = self._triangles(number)
+        tangents = self.tangents(features, vertices, pairs)
+        segments = _Pieces(features[:, [0, 1, 1]], tangents[:, [0, 1, 1]], of_curve[chain])
+        both = _both_ways(features)
+        turned = np.concatenate([np.roll(triangles.vertices, -i, axis=1) for i in range(3)])
+        along = np.column_stack([both, np.full(len(both), -1), np.tile(segments.shape, 2)])
+        around = np.concatenate([np.column_stack([turned, np.tile(triangles.shape, 3)]), along]).astype(np.int32)
+        every = _both_ways(self.edges)
+        edges = np.concatenate([every[on_surface[every[:, 0]]], both[on_curve[both[:, 0]]]])
+        directions = [2] * surfaces + [1] * curves
+        return _curved(shape, edges, around, [triangles, segments], directions, self)
+
+    def _triangles(self, number: Numbers) -> _Pieces:
+        """Return the triangles of facets, those with four corners cut in two, with the normals of their fans."""
+        facets = self.given.facets
+        corner = np.full(facets.shape, -1, dtype=np.int32)
+        corner[facets >= 0] = np.arange(len(self.sides.corners), dtype=np.int32)
+        rows, cuts = np.arange(len(facets)), [[0, 1, 2]]
+        which, places = [rows], [np.tile(cuts[0], (len(rows), 1))]
+        if facets.shape[1] == 4:
+            rows = np.flatnonzero(facets[:, 3] >= 0)
+            which.append(rows)
+            places.append(np.tile([0, 2, 3], (len(rows), 1)))
+        row, place = np.concatenate(which)[:, None], np.concatenate(places)
+        normals = self._normals()[self.fan[corner[row, place]]]
+        return _Pieces(facets[row, place], normals, number[self.patch[row[:, 0]]])
+
+    def _normals(self) -> Array:
+        """Return the unit normal of each fan (corners,), facets weighted by their angles there."""
+        facets = self.given.facets
+        rows, places = np.nonzero(facets >= 0)
+        width = (facets >= 0).sum(axis=1)[rows]
+        here = self.points[facets[rows, places]]
+        one, other = (_unit(self.points[facets[rows, (places + step) % width]] - here) for step in (1, -1))
+        angle = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
+        weighted = angle[:, None] * self.units[rows]
+        return _unit(np.stack([np.bincount(self.fan, column, len(self.fan)) for column in weighted.T], axis=1))
+
+
+def _both_ways(edges: Numbers) -> Numbers:
+    return np.concatenate([edges, edges[:, ::-1]])
+
+
+def _unit(vectors: Array) -> Array:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def _curved(
+    shape: Numbers, edges: Numbers, around: Numbers, pieces: list[_Pieces], directions: list[int], found: _Shaped
+) -> Curved:
+    """Put together what slides: of pieces, and rows (r, 4) of what is around their first vertices, what is needed."""
+    points = found.points
+    of_piece = np.concatenate([one.shape for one in pieces])
+    order = np.argsort(of_piece, kind="stable")[int((of_piece < 0).sum()) :]
+    count = len(directions)
+    first = np.concatenate([[0], np.cumsum(np.bincount(of_piece[order], minlength=count))]).astype(np.int32)
+    vertices = np.concatenate([one.vertices for one in pieces])[order]
+    ways = np.concatenate([one.ways for one in pieces])[order]
+    around = around[(shape[around[:, 0]] >= 0) & (around[:, 3] >= 0)]
+    around = around[np.argsort(around[:, 0], kind="stable")]
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(around[:, 0], minlength=len(points)))]).astype(np.int32)
+    shapes = Shapes(
+        vertices, points[vertices], ways, first, np.array(directions, dtype=np.uint8), offsets,
+        np.ascontiguousarray(around[:, 1:]), found.smooth.bound, found.folds,
+    )  # fmt: skip
+    return Curved(shape, edges[shape[edges[:, 0]] >= 0], shapes)

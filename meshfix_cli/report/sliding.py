@@ -1,0 +1,41 @@
+"""What is said of boundaries that slide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from meshfix_cli.mesh.elements import counted
+from meshfix_cli.report.facts import Report
+
+
+def sliding(report: Report) -> Iterator[str]:
+    """Say how the shape has changed or, where fixed vertices limit the mesh, what sliding would gain."""
+    facts = report.facts or {}
+    if "shape" in facts:
+        yield from _changed(facts["shape"], report.mesh.dimension == 3)
+    if "slide_flat" in facts:
+        yield _gain(facts["slide_flat"], report)
+
+
+def _changed(shape: Mapping[str, Any], solid: bool) -> Iterator[str]:
+    size, boundary = ("volume", "area") if solid else ("area", "length")
+    yield (
+        f"the boundary is within {shape['hausdorff']:.3g} of its shape (Hausdorff distance), its {boundary} changed by "
+        f"{shape['boundary']:.2g} of itself, the {size} by {shape['size']:.2g}"
+    )
+    if shape["folds"]:
+        where = counted(shape["folds"], "edge" if solid else "vertex", "edges" if solid else "vertices")
+        yield (
+            f"the boundary itself is folded at {where} and is its own reference: vertices there stay, and others keep "
+            "to it as it is; --reference names the mesh before"
+        )
+
+
+def _gain(gain: Mapping[str, Any], report: Report) -> str:
+    could = f"{gain['free_vertices']:,} instead of {int(report.mesh.movable.sum()):,} vertices could move"
+    unit = "°" if report.mesh.topology.simplicial else ""
+    ceiling = "there would be no ceiling"
+    if gain["ceiling"] is not None:
+        ceiling = f"the ceiling would be {gain['ceiling']:.3f}{unit}"
+    return f"with --slide flat {could}, and {ceiling}"

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from meshfix_cli.errors import RequirementError, WriteError, listed
 from meshfix_cli.mesh.elements import counted, words
@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     Steps = Iterator[tuple[Mesh, SweepRecord]]
 
 
+Sliding = Literal["none", "flat", "curved"]
+SLIDES: tuple[Sliding, ...] = get_args(Sliding)  # the later, the more vertices move
 NEAR_CEILING = 0.9  # of it: from there on it is what limits the smallest angle or scaled Jacobian
 MAX_DEVIATION = Distance(0.03, in_h=True)
 
@@ -151,7 +153,7 @@ class Method:
     threshold: float | None = None
     max_move: Distance | None = None
     only_invalid: bool = False
-    slide: Literal["none", "flat", "curved"] = "none"
+    slide: Sliding = "none"
     slide_interfaces: bool = True
     feature_angle: float = 40.0
     max_deviation: Distance = MAX_DEVIATION
@@ -349,16 +351,15 @@ def repair(
     from meshfix_cli.quality.summary import displacement
 
     judge.check(document)
-    document = method.freed(document, reference)
     threads = judge.threads
     reach = method.reach(document.mesh, threads)
     solve = partial(method.solve, threads=threads) if solve is None else solve
-    outcome = solve(document.mesh, reach, reference=reference)
+    document, outcome, slid = _solved(document, method, partial(solve, reference=reference), reach, reference)
     meshes = outcome.after, outcome.untangled, outcome.before
     after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
     result, written = files.write(document, after, output, put)
     asked = method.smooth and not method.only_invalid and reference is None
-    notes = (*_what_happened(document, bool(asked), outcome, after, rounded), *written)
+    notes = (*slid, *_what_happened(document, bool(asked), outcome, after, rounded), *written)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
     facts: dict[str, Any] = {"strategy": method.strategy, "displacement": displacement(outcome.before, result)}
     if outcome.ranks:
@@ -368,6 +369,30 @@ def repair(
     return judge.report(
         "untangle", document, stages, notes, outcome.obstacles, reference, records=outcome.records, facts=facts
     )
+
+
+def _solved(
+    document: Document,
+    method: Method,
+    solve: Callable[..., Outcome],
+    reach: float,
+    reference: NDArray[np.float64] | None,
+) -> tuple[Document, Outcome, tuple[str, ...]]:
+    """Solve a mesh in which vertices slide as they may; where that leads astray, less, and say so."""
+    freed = method.freed(document, reference)
+    outcome = solve(freed.mesh, reach)
+    notes: tuple[str, ...] = ()
+    for slide in SLIDES[: SLIDES.index(method.slide)][::-1]:
+        left = outcome.records[-1]
+        if not left.inverted:
+            break
+        other = replace(method, slide=slide).freed(document, reference)
+        instead = solve(other.mesh, reach)
+        if instead.records[-1].rank < left.rank:
+            freed, outcome = other, instead
+            inverted = counted(left.inverted, "element", "elements")
+            notes = (f"--slide {method.slide} would leave {inverted} inverted, so that --slide {slide} is taken",)
+    return freed, outcome, notes
 
 
 def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from meshfix_cli.cli.files import given
 from meshfix_cli.cli.names import CELLS, FILE, PAGE, PLOT
 from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
-from meshfix_cli.repair import MAX_DEVIATION, Files, Held, Judge, Method
+from meshfix_cli.repair import MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
@@ -292,7 +292,7 @@ solving = packed(
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
     click.option(
         "--slide",
-        type=click.Choice(("none", "flat", "curved")),
+        type=click.Choice(SLIDES),
         default="none",
         show_default=True,
         help="Let vertices of the boundary move where that does not change its shape. flat: in planes and on straight "

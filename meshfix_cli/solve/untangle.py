@@ -127,9 +127,10 @@ def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tu
     run = iter(run)
     mesh, record = next(run)
     before = untangled = mesh
-    records = [record]
+    records, smooths = [record], False
     for mesh, record in run:
-        if not record.phase.startswith(SMOOTHING):
+        smooths = smooths or record.phase.startswith(SMOOTHING)  # also where it goes back to the best
+        if not smooths:
             untangled = mesh
         records.append(record)
     return before, untangled, mesh, tuple(records)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import elements
 import generate
 import numpy as np
@@ -10,12 +12,15 @@ from boxes import may_move, union
 from geometries import grid
 from meshes import sliding
 from numpy.typing import NDArray
+from reports import document_of
 
-from meshfix_cli import kernels, untangle
+from meshfix_cli import kernels, repair, untangle
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.document import Document
 from meshfix_cli.quality.summary import ceiling, summarise
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.perturb import perturb
+from meshfix_cli.solve.records import Outcome
 
 Points = NDArray[np.float64]
 L = np.array([[True, True], [True, False]])
@@ -200,3 +205,35 @@ def test_a_boundary_that_is_not_tangled_stays_until_the_inside_is_mended() -> No
     assert outcome.valid
     boundary = valid.topology.boundary
     assert np.array_equal(outcome.after.points[boundary], valid.points[boundary])
+
+
+def test_less_slides_where_more_leads_astray(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What sliding leaves inverted is solved with the boundary held, and that is told."""
+    valid = Mesh.build(*generate.bracket(0.3, 4))
+    document = document_of(perturb(valid, 25, valid.mean_edge_length())[0])
+    document = replace(
+        document, solved=replace(document.solved, rest=()), holds={"on the boundary": valid.topology.boundary}
+    )
+    monkeypatch.setattr(repair.Method, "freed", freed)
+
+    def solve(mesh: Mesh, reach: float) -> Outcome:
+        return Method(smooth=0, sweeps=0 if mesh.freedom is not None else None).solve(mesh, reach, 1)
+
+    last, outcome, notes = repair._solved(document, Method(slide="flat"), solve, np.inf, None)
+    assert outcome.valid
+    assert last.mesh.freedom is None
+    assert [note for note in notes if note.startswith("--slide flat would leave ") and note.endswith("none is taken")]
+    _, _, silent = repair._solved(document, Method(), solve, np.inf, None)
+    assert silent == ()
+
+
+def freed(method: Method, document: Document, reference: Points | None = None) -> Document:
+    """As the method of this name, of documents that no file stands behind."""
+    del reference
+    return document if method.slide == "none" else replace(document, mesh=sliding(document.mesh))
+
+
+def test_the_untangled_mesh_is_that_before_smoothing() -> None:
+    tangled = perturb(Mesh.build(*generate.bracket(0.3, 4)), 25, 0.2)[0]
+    plain, best = (untangle(tangled, smooth=smooth) for smooth in (0, "best"))
+    assert best.untangled.points.tobytes() == plain.after.points.tobytes()

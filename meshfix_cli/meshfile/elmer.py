@@ -33,7 +33,7 @@ from meshfix_cli.meshfile.tables import (
     lines,
 )
 from meshfix_cli.meshfile.text import in_line
-from meshfix_cli.meshfile.together import Together
+from meshfix_cli.meshfile.together import Together, all_there, beside_output
 
 HEADER = "mesh.header"
 _OTHERS = (".boundary", ".names")  # what belongs to a mesh and may be missing
@@ -50,9 +50,7 @@ def parse(_: bytes, path: Path | None) -> Source:
         raise ReadError("is one of several files of Elmer, so it is read from its file and not from a stream")
     header = path / HEADER if path.is_dir() else path.with_suffix(".header")
     changed = [header.with_suffix(suffix) for suffix in (".nodes", ".elements")]
-    for one in (header, *changed):
-        if not one.is_file():
-            raise ReadError(f"{one.name}, which belongs to it, is not there")
+    all_there((header, *changed))
     copied = [header, *[one for suffix in _OTHERS if (one := header.with_suffix(suffix)).is_file()]]
     beside = {one.suffix: one.read_bytes() for one in copied}
 
@@ -61,11 +59,7 @@ def parse(_: bytes, path: Path | None) -> Source:
             like = "a folder" if path.is_dir() else "a .header"
             raise WriteError(f"{target}: is not {like}, as the input is")
         there = target / HEADER if path.is_dir() else target
-        mine = [there.with_suffix(one.suffix) for one in (*changed, *copied)]
-        stale = [one for suffix in _OTHERS if (one := there.with_suffix(suffix)).exists() and one not in mine]
-        if stale:
-            raise WriteError(f"{target}: {stale[0].name} is there, and would belong to it; name another OUTPUT")
-        return mine
+        return beside_output(target, there, (*changed, *copied), _OTHERS)
 
     def read(contents: Sequence[bytes]) -> Source:
         source, layout = _source(contents[0], contents[1], beside)

@@ -22,7 +22,7 @@ from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import CODES, IntegerLines, Numbering, Runs, check_blank, integer_lines, lines, without
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
-from meshfix_cli.meshfile.together import Together
+from meshfix_cli.meshfile.together import Together, all_there, beside_output
 
 _COMMENT = re.compile(rb"#[^\n\r]*")
 _REF = "tetgen:ref"
@@ -36,20 +36,14 @@ def parse(_: bytes, path: Path | None) -> Source:
     if path is None:
         raise ReadError("is one of two files, .node and .ele, so it is read from its file and not from a stream")
     changed = [path.with_suffix(suffix) for suffix in (".node", ".ele")]
-    for one in changed:
-        if not one.is_file():
-            raise ReadError(f"{one.name}, which belongs to it, is not there")
+    all_there(changed)
     copied = [one for suffix in _COPIED if (one := path.with_suffix(suffix)).is_file()]
     facets = {one.suffix: one.read_bytes() for one in copied if one.suffix in _FACETS}
 
     def places(target: Path) -> list[Path]:
         if target.suffix not in (".node", ".ele"):
             raise WriteError(f"{target}: is neither a .node nor an .ele")
-        mine = [target.with_suffix(one.suffix) for one in (*changed, *copied)]
-        stale = [one for suffix in _FACETS if (one := target.with_suffix(suffix)).exists() and one not in mine]
-        if stale:
-            raise WriteError(f"{target}: {stale[0].name} is there, and would belong to it; name another OUTPUT")
-        return mine
+        return beside_output(target, target, (*changed, *copied), _FACETS)
 
     def read(contents: Sequence[bytes]) -> Source:
         source, layout = _source(contents[0], contents[1], facets)

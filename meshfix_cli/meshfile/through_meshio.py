@@ -109,7 +109,8 @@ def _clock_stopped(form: Format) -> Iterator[None]:
 
 def _failing(types: Iterable[str], points: NDArray[np.floating[Any]]) -> str:
     """Say what a writer does not take that fails on no more than some types of cells."""
-    plural = " and ".join(sorted(words(key)[1] for key in types))
+    *others, last = sorted(words(key)[1] for key in types) or ["no cells"]
+    plural = f"{', '.join(others)} and {last}" if others else last
     plane = max(map(dimension_of, types), default=0) < points.shape[1]
     return f"meshio's writer fails on {plural}{' whose points have three coordinates' if plane else ''}"
 

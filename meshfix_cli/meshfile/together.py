@@ -3,15 +3,37 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from meshfix_cli.errors import WriteError
+from meshfix_cli.errors import ReadError, WriteError
 from meshfix_cli.meshfile.source import Layout, Source
 from meshfix_cli.meshfile.splice import Points, Turned
 
 Contents = Callable[[Points, Points, Mapping[int, Turned]], list[bytes]]
+
+
+def all_there(files: Iterable[Path]) -> None:
+    """Refuse, as a ReadError, to read a mesh of which files are missing."""
+    for one in files:
+        if not one.is_file():
+            raise ReadError(f"{one.name}, which belongs to it, is not there")
+
+
+def beside_output(target: Path, there: Path, files: Iterable[Path], others: Iterable[str]) -> list[Path]:
+    """Return where files of an input, which its extension tells apart, go beside one of an output.
+
+    Raises
+    ------
+    WriteError
+        A file is there, with one of the other extensions, that would belong to the output.
+    """
+    mine = [there.with_suffix(one.suffix) for one in files]
+    stale = [one for suffix in others if (one := there.with_suffix(suffix)).exists() and one not in mine]
+    if stale:
+        raise WriteError(f"{target}: {stale[0].name} is there, and would belong to it; name another OUTPUT")
+    return mine
 
 
 @dataclass(frozen=True, eq=False)

@@ -453,7 +453,7 @@ def test_a_failed_write_leaves_the_original(
 
     monkeypatch.setattr(meshio, "write", broken)
     with pytest.raises(
-        WriteError, match="No space left" if fault == "disk" else r"cannot be written as permas \(it does not take"
+        WriteError, match="No space left" if fault == "disk" else r"cannot be written as permas \(meshio's writer"
     ):
         write(document, tangle(document.mesh), path)
     assert path.read_bytes() == original

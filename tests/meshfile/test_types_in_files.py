@@ -199,7 +199,7 @@ def test_what_a_format_does_not_hold_is_not_left_out(tmp_path: Path) -> None:
     document = read(tmp_path / "in.msh")
     with pytest.raises(WriteError, match="cannot be written as cgns: that holds no"):
         write(document, document.mesh, tmp_path / "out.cgns")
-    with pytest.raises(WriteError, match=r"cannot be written as abaqus \('pyramid' in it"):
+    with pytest.raises(WriteError, match="writer fails on hexahedra, pyramids, tetrahedra and wedges"):
         write(document, document.mesh, tmp_path / "out.inp")
 
 

@@ -44,6 +44,12 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join(names[:MOST_NAMED]) + more
 
 
+def together(names: Sequence[str]) -> str:
+    """Name all of some things: "a", "a and b", "a, b and c"."""
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
+
+
 @contextmanager
 def naming(name: str) -> Iterator[None]:
     """Let errors begin with the name of the file that they are about."""

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from meshfix_cli.errors import RequirementError, WriteError, listed
+from meshfix_cli.errors import RequirementError, WriteError, listed, together
 from meshfix_cli.mesh.elements import counted, words
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.solve.perturb import Distance
@@ -162,11 +162,12 @@ class Method:
         """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
         if self.slide == "none":
             return document
-        from meshfix_cli.mesh.curved import Smooth
         from meshfix_cli.meshfile.sliding import slid
 
         smooth = None
         if self.slide == "curved":
+            from meshfix_cli.mesh.curved import Smooth
+
             mesh = document.mesh if reference is None else document.mesh.with_vertices(reference)
             smooth = Smooth(self.feature_angle, self.max_deviation.length(mesh))
         return slid(document, self.slide_interfaces, reference, smooth=smooth)
@@ -234,8 +235,7 @@ class Judge:
         """Refuse, as a RequirementError, to judge a mesh by what none of its elements has."""
         for one in self.requirements:
             if not having(one.name, document.mesh):
-                *others, last = (words(key)[1] for key in types_with(one.name))
-                have = f"{', '.join(others)} and {last}"
+                have = together([words(key)[1] for key in types_with(one.name)])
                 raise RequirementError(f"{document.name}: no element has the {one.name} required; only {have} have one")
 
     def report(

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.patches import Constraints, Sides, edges_of, normals_of, numbered, of_two, sides_of
+from meshfix_cli.mesh.patches import Constraints, Joints, normals_of, numbered, of_two
+from meshfix_cli.mesh.topology import rows_of_part
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -82,10 +83,7 @@ class Shapes:
 
     def part(self, vertices: Numbers, number: Numbers, own: int) -> Shapes:
         """Return that of a part of the mesh, see `Freedom.part`, with all pieces; new numbers of vertices (k,)."""
-        counts = np.diff(self.offsets)[vertices]
-        counts[own:] = 0
-        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        places = np.arange(offsets[-1]) + np.repeat(self.offsets[vertices] - offsets[:-1], counts)
+        offsets, places = rows_of_part(self.offsets, vertices, own)
         around = self.around[places]
         around[:, :2] = np.where(around[:, :2] < 0, -1, number[around[:, :2]])
         same = self.vertices, self.corners, self.ways, self.first, self.directions
@@ -218,39 +216,24 @@ class _Solid(_Shaped):
 
     def __init__(self, points: Array, given: Constraints, smooth: Smooth) -> None:
         super().__init__(points, given, smooth)
-        self.sides: Sides = sides_of(given.facets)
-        self.edges, here, self.count, is_line = edges_of(self.sides, given.lines)
-        pair = np.flatnonzero((self.count == 2) & ~is_line)
-        first = np.concatenate([[0], np.cumsum(self.count)])[pair]
-        two = np.stack([here[first], here[first + 1]], axis=1)
-        pairs = self.sides.owners[two]
-        good = self.meet_smoothly(pairs)
-        self.is_feature = np.ones(len(self.edges), dtype=bool)
-        self.is_feature[pair[good]] = False
-        self.patch = kernels.joined(np.ascontiguousarray(pairs[good]), len(given.facets))
-        ends = self.sides.ends[two[good]]
-        corners = len(self.sides.corners)
-        self.fan = kernels.joined(np.concatenate([ends[:, :, 0], ends[:, :, 1]]), corners)
-        whole = self.fan == np.arange(corners)
-        self.fans = np.bincount(self.sides.corners[whole], minlength=len(points))
+        self.joints = Joints(given.facets, given.lines)
+        good = self.meet_smoothly(self.joints.pairs)
+        self.is_feature, self.around = self.joints.divided(good)
+        self.patch = kernels.joined(np.ascontiguousarray(self.joints.pairs[good]), len(given.facets))
 
     @cached_property
     def curves(self) -> tuple[Numbers, Numbers, Numbers]:
         """The features (e, 2), the vertices (v,) at which two go on in each other, and these (v, 2)."""
-        features, facets = self.edges[self.is_feature], self.count[self.is_feature]
-        which = np.repeat(np.arange(len(features), dtype=np.int32), 2)
-        vertices, pairs = of_two(features.ravel(), which, len(self.points))
-        ways = self.points[features[pairs].sum(axis=2) - vertices[:, None]] - self.points[vertices][:, None]
+        features = self.joints.edges[self.is_feature]
+        vertices, pairs, ways = self.around.passed(self.points, features, self.joints.count[self.is_feature])
         unit = _unit(ways)
         good = -(unit[:, 0] * unit[:, 1]).sum(axis=1) >= self.smooth.cosine
-        # Each side reaches from one feature to the other; a fan that does not is a cone of its own.
-        good &= 2 * self.fans[vertices] == facets[pairs].sum(axis=1)
         return features, vertices[good], pairs[good]
 
     def found(self, flat: NDArray[np.uint8]) -> Curved:
-        k, corners, owners = len(self.points), self.sides.corners, self.sides.corner_owners
+        k, corners, owners = len(self.points), self.around.vertices, self.around.owners
         features, vertices, pairs = self.curves
-        on_surface = (self.fans == 1) & (flat < 2)
+        on_surface = (self.around.fans(k) == 1) & (flat < 2)
         on_surface[features] = False
         on_curve = np.zeros(k, dtype=bool)
         on_curve[vertices[flat[vertices] == 0]] = True
@@ -271,7 +254,7 @@ class _Solid(_Shaped):
         turned = np.concatenate([np.roll(triangles.vertices, -i, axis=1) for i in range(3)])
         along = np.column_stack([both, np.full(len(both), -1), np.tile(segments.shape, 2)])
         around = np.concatenate([np.column_stack([turned, np.tile(triangles.shape, 3)]), along]).astype(np.int32)
-        every = _both_ways(self.edges)
+        every = _both_ways(self.joints.edges)
         edges = np.concatenate([every[on_surface[every[:, 0]]], both[on_curve[both[:, 0]]]])
         directions = [2] * surfaces + [1] * curves
         return _curved(shape, edges, around, [triangles, segments], directions, self)
@@ -280,7 +263,7 @@ class _Solid(_Shaped):
         """Return the triangles of facets, those with four corners cut in two, with the normals of their fans."""
         facets = self.given.facets
         corner = np.full(facets.shape, -1, dtype=np.int32)
-        corner[facets >= 0] = np.arange(len(self.sides.corners), dtype=np.int32)
+        corner[facets >= 0] = np.arange(len(self.around.vertices), dtype=np.int32)
         rows, cuts = np.arange(len(facets)), [[0, 1, 2]]
         which, places = [rows], [np.tile(cuts[0], (len(rows), 1))]
         if facets.shape[1] == 4:
@@ -288,7 +271,7 @@ class _Solid(_Shaped):
             which.append(rows)
             places.append(np.tile([0, 2, 3], (len(rows), 1)))
         row, place = np.concatenate(which)[:, None], np.concatenate(places)
-        normals = self._normals()[self.fan[corner[row, place]]]
+        normals = self._normals()[self.around.fan[corner[row, place]]]
         return _Pieces(facets[row, place], normals, number[self.patch[row[:, 0]]])
 
     def _normals(self) -> Array:
@@ -299,8 +282,8 @@ class _Solid(_Shaped):
         here = self.points[facets[rows, places]]
         one, other = (_unit(self.points[facets[rows, (places + step) % width]] - here) for step in (1, -1))
         angle = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
-        weighted = angle[:, None] * self.units[rows]
-        return _unit(np.stack([np.bincount(self.fan, column, len(self.fan)) for column in weighted.T], axis=1))
+        weighted, fan = angle[:, None] * self.units[rows], self.around.fan
+        return _unit(np.stack([np.bincount(fan, column, len(fan)) for column in weighted.T], axis=1))
 
 
 def _both_ways(edges: Numbers) -> Numbers:

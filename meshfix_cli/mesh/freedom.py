@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.patches import Constraints, Slides, lines_of_plane, of_solid, tolerance_of
-from meshfix_cli.mesh.topology import Topology
+from meshfix_cli.mesh.topology import Topology, rows_of_part
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.curved import Shapes, Smooth
@@ -79,24 +79,25 @@ class Freedom:
         """Return that of a part of the mesh: vertices (v,), of which the first `own` have their neighbours in it."""
         number = np.full(len(self.frame), -1, dtype=np.int32)
         number[vertices] = np.arange(len(vertices), dtype=np.int32)
-        counts = np.diff(self.offsets)[vertices]
-        counts[own:] = 0
-        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-        places = np.arange(offsets[-1]) + np.repeat(self.offsets[vertices] - offsets[:-1], counts)
+        offsets, places = rows_of_part(self.offsets, vertices, own)
         neighbours = number[self.neighbours[places]]
         shapes = None if self.shapes is None else self.shapes.part(vertices, number, own)
         return Freedom(self.frame[vertices], self.directions, self.axes, offsets, neighbours, shapes)
 
+    def _along(self, vertices: NDArray[np.integer], ways: Array) -> tuple[Array, Array]:
+        """Return the axes (v, d, d) of lines and planes, else 0, and the parts of ways (v, d) along them."""
+        count = self.directions[self.frame[vertices]]
+        some = np.arange(ways.shape[1]) < count[:, None]
+        axes = np.where(some[:, :, None], self.axes[self.frame[vertices]], 0.0)
+        return axes, np.einsum("vik,vi->vk", axes, np.einsum("vik,vk->vi", axes, ways))
+
     def onto(self, points: Array, anchors: Array) -> Array:
         """Return points (k, d) with those that slide in their lines and planes through anchors (k, d)."""
         rows = np.flatnonzero((self.frame >= 0) & ~self.curved)
-        count = self.directions[self.frame[rows]]
-        some = np.arange(points.shape[1]) < count[:, None]
-        axes = np.where(some[:, :, None], self.axes[self.frame[rows]], 0.0)
-        way = np.einsum("vik,vk->vi", axes, points[rows] - anchors[rows])
+        axes, way = self._along(rows, points[rows] - anchors[rows])
         changed = (axes != 0).any(axis=1)
-        aligned = changed.sum(axis=1) == count
-        there = np.where(aligned[:, None], points[rows], anchors[rows] + np.einsum("vik,vi->vk", axes, way))
+        aligned = changed.sum(axis=1) == self.directions[self.frame[rows]]
+        there = np.where(aligned[:, None], points[rows], anchors[rows] + way)
         result = points.copy()
         result[rows] = np.where(changed, there, anchors[rows])
         return result
@@ -111,10 +112,8 @@ class Freedom:
         flat = ~(self.curved[first] | self.curved[other])
         first, other = first[flat], other[flat]
         edges, moved = before[first] - before[other], now - before
-        some = np.arange(before.shape[1]) < self.directions[self.frame[first]][:, None]
-        axes = np.where(some[:, :, None], self.axes[self.frame[first]], 0.0)
         apart = moved[first] - moved[other]
-        apart -= np.einsum("vik,vi->vk", axes, np.einsum("vik,vk->vi", axes, apart))
+        apart -= self._along(first, apart)[1]
         length = float(np.linalg.norm(edges, axis=1).mean()) if len(edges) else 0.0
         mask = np.zeros(len(before), dtype=bool)
         mask[first[np.linalg.norm(apart, axis=1) > tolerance_of(now, length) * length]] = True

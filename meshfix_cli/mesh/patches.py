@@ -103,67 +103,39 @@ def lines_of_plane(points: Array, given: Constraints, tolerance: float) -> Slide
 
 def of_solid(points: Array, given: Constraints, tolerance: float) -> list[Slides]:
     """Find the vertices of a solid mesh that slide along edges, and in planes."""
-    surface = _Surface(points, given, tolerance)
-    sides = sides_of(given.facets)
-    edges, here, count, is_line = edges_of(sides, given.lines)
-    pair = np.flatnonzero((count == 2) & ~is_line)
-    first = np.concatenate([[0], np.cumsum(count)])[pair]
-    two = np.stack([here[first], here[first + 1]], axis=1)  # sides
-    pairs = sides.owners[two]
-    smooth, patch = surface.patches(pairs)
-    is_crease = np.ones(len(edges), dtype=bool)
-    is_crease[pair[smooth]] = False
-    ends = sides.ends[two[smooth]]  # corners, at the smaller vertex and at the larger one
-    fan = kernels.joined(np.concatenate([ends[:, :, 0], ends[:, :, 1]]), len(sides.corners))
-    around = _Around(sides.corners, sides.corner_owners, fan, patch)
-    creases = edges[is_crease]
+    surface, joints = _Surface(points, given, tolerance), Joints(given.facets, given.lines)
+    smooth, patch = surface.patches(joints.pairs)
+    is_crease, around = joints.divided(smooth)
+    creases = joints.edges[is_crease]
     return [
-        _along_edges(surface, around, creases, count[is_crease]),
-        _in_planes(surface, around, creases, edges),
+        _along_edges(surface, around, patch, creases, joints.count[is_crease]),
+        _in_planes(surface, around, patch, creases, joints.edges),
     ]
 
 
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """The corners (c,) of facets: their vertices, their facets, a number for the fan of each; and the patch of a facet.
-
-    A fan are the facets around a vertex that are joined by edges which are no creases.
-    """
-
-    vertices: Numbers
-    owners: Numbers
-    fan: Numbers
-    patch: Numbers
-
-
-def _in_planes(surface: _Surface, around: _Around, creases: Numbers, edges: Numbers) -> Slides:
+def _in_planes(surface: _Surface, around: Around, patch: Numbers, creases: Numbers, edges: Numbers) -> Slides:
     n = len(surface.points)
     good = np.zeros(n, dtype=bool)
     good[around.vertices] = True
     good[creases] = False
-    good &= np.bincount(around.vertices[around.fan == np.arange(len(around.fan))], minlength=n) == 1
+    good &= around.fans(n) == 1
     mine = good[around.vertices]
     vertices, owners = around.vertices[mine], around.owners[mine]
-    good &= surface.unfolded(vertices, owners, vertices, around.patch)
+    good &= surface.unfolded(vertices, owners, vertices, patch)
     of_vertex = np.zeros(n, dtype=np.int32)
-    of_vertex[vertices] = around.patch[owners]
+    of_vertex[vertices] = patch[owners]
     here = np.flatnonzero(good).astype(np.int32)
-    plane = _planes(surface, around.patch, of_vertex[here])
+    plane = _planes(surface, patch, of_vertex[here])
     return Slides(here[plane.kept], plane.frame, plane.axes, 2, edges)
 
 
-def _along_edges(surface: _Surface, around: _Around, creases: Numbers, facets: Places) -> Slides:
+def _along_edges(surface: _Surface, around: Around, patch: Numbers, creases: Numbers, facets: Places) -> Slides:
     points, tolerance = surface.points, surface.tolerance
-    which = np.repeat(np.arange(len(creases), dtype=np.int32), 2)
-    vertices, pairs = of_two(creases.ravel(), which, len(points))
-    ways = points[creases[pairs].sum(axis=2) - vertices[:, None]] - points[vertices][:, None]
-    straight = _sine(ways[:, 0], ways[:, 1]) <= tolerance
-    straight &= ((ways[:, 0] * ways[:, 1]).sum(axis=1) < 0) | surface.given.broken[vertices]
-    vertices, pairs = vertices[straight], pairs[straight]
-    # Each side reaches from one crease to the other; a fan that does not is a cone of its own.
-    sides = np.bincount(around.vertices[around.fan == np.arange(len(around.fan))], minlength=len(points))
-    good = 2 * sides[vertices] == facets[pairs].sum(axis=1)
-    good &= _flat_sides(surface, around, vertices)
+    vertices, pairs, ways = around.passed(points, creases, facets)
+    good = _sine(ways[:, 0], ways[:, 1]) <= tolerance
+    good &= ((ways[:, 0] * ways[:, 1]).sum(axis=1) < 0) | surface.given.broken[vertices]
+    vertices, pairs = vertices[good], pairs[good]
+    good = _flat_sides(surface, around, patch, vertices)
     vertices, pairs = vertices[good], pairs[good]
     chain = kernels.joined(np.ascontiguousarray(pairs), len(creases))
     ways = points[creases[:, 1]] - points[creases[:, 0]]
@@ -171,7 +143,7 @@ def _along_edges(surface: _Surface, around: _Around, creases: Numbers, facets: P
     return Slides(vertices[line.kept], line.frame, line.axes, 1, creases)
 
 
-def _flat_sides(surface: _Surface, around: _Around, vertices: Numbers) -> Mask:
+def _flat_sides(surface: _Surface, around: Around, patch: Numbers, vertices: Numbers) -> Mask:
     """Whether the facets on each side of a crease, at some vertices (v,) of it, are flat and not folded."""
     mine = np.zeros(len(surface.points), dtype=bool)
     mine[vertices] = True
@@ -181,7 +153,7 @@ def _flat_sides(surface: _Surface, around: _Around, vertices: Numbers) -> Mask:
     place = number[fan]
     normals = surface.normals[owners]
     spread, _ = _common_direction(normals, place, int(place.max(initial=-1)) + 1)
-    good = surface.unfolded(fan, owners, corners, around.patch)[fan] & (spread[place] <= surface.tolerance)
+    good = surface.unfolded(fan, owners, corners, patch)[fan] & (spread[place] <= surface.tolerance)
     bad = np.zeros(len(surface.points), dtype=bool)
     bad[corners[~good]] = True
     return ~bad[vertices]
@@ -258,8 +230,67 @@ def _sine(one: Array, other: Array) -> Array:
     return np.divide(across, product, out=np.zeros(len(one)), where=product > 0)
 
 
+class Joints:
+    """Where facets in space meet.
+
+    Attributes
+    ----------
+    edges : (e, 2) int32
+        Of the facets, and the lines beside them.
+    count : (e,) int
+        How many facets each is of.
+    pairs : (p, 2) int32
+        Facets that meet at an edge of theirs alone, which is no line.
+    """
+
+    def __init__(self, facets: Numbers, lines: Numbers) -> None:
+        self._sides = _sides(facets)
+        self.edges, here, self.count, is_line = _edges(self._sides, lines)
+        self._between = np.flatnonzero((self.count == 2) & ~is_line)
+        first = np.concatenate([[0], np.cumsum(self.count)])[self._between]
+        self._two = np.stack([here[first], here[first + 1]], axis=1)  # sides
+        self.pairs = self._sides.owners[self._two]
+
+    def divided(self, smooth: Mask) -> tuple[Mask, Around]:
+        """Return at which edges (e,) facets do not go on in each other, as some pairs (p,) do, and their fans."""
+        ends = np.ones(len(self.edges), dtype=bool)
+        ends[self._between[smooth]] = False
+        joined = self._sides.ends[self._two[smooth]]  # corners, at the smaller vertex and at the larger one
+        corners = self._sides.corners
+        fan = kernels.joined(np.concatenate([joined[:, :, 0], joined[:, :, 1]]), len(corners))
+        return ends, Around(corners, self._sides.corner_owners, fan)
+
+
 @dataclass(frozen=True, eq=False)
-class Sides:
+class Around:
+    """The corners (c,) of facets: their vertices, their facets, and a number for the fan of each.
+
+    A fan are the facets around a vertex that go on in each other.
+    """
+
+    vertices: Numbers
+    owners: Numbers
+    fan: Numbers
+
+    def fans(self, n: int) -> NDArray[np.int64]:
+        """Return how many there are at each vertex (n,)."""
+        return np.bincount(self.vertices[self.fan == np.arange(len(self.fan))], minlength=n)
+
+    def passed(self, points: Array, edges: Numbers, facets: Places) -> tuple[Numbers, Numbers, Array]:
+        """Return the vertices (v,) at which two edges (e, 2) between fans meet, these (v, 2), and their ways (v, 2, d).
+
+        `facets` (e,): how many facets each edge is of. Each fan reaches from one edge to the other; a vertex with one
+        that does not, a cone of its own, is left out.
+        """
+        which = np.repeat(np.arange(len(edges), dtype=np.int32), 2)
+        vertices, pairs = of_two(edges.ravel(), which, len(points))
+        whole = 2 * self.fans(len(points))[vertices] == facets[pairs].sum(axis=1)
+        vertices, pairs = vertices[whole], pairs[whole]
+        return vertices, pairs, points[edges[pairs].sum(axis=2) - vertices[:, None]] - points[vertices][:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class _Sides:
     """The sides (s,) of facets in space: from the smaller vertex to the larger, their facets, their corners there."""
 
     vertices: Numbers
@@ -269,8 +300,7 @@ class Sides:
     corner_owners: Numbers
 
 
-def sides_of(facets: Numbers) -> Sides:
-    """Return the sides of facets (f, w)."""
+def _sides(facets: Numbers) -> _Sides:
     there = facets >= 0
     rows, places = np.nonzero(there)
     corner = np.full(facets.shape, -1, dtype=np.int32)
@@ -280,10 +310,10 @@ def sides_of(facets: Numbers) -> Sides:
     ends = np.stack([corner[rows, places], corner[rows, after]], axis=1)
     turned = vertices[:, 0] > vertices[:, 1]
     vertices[turned], ends[turned] = vertices[turned, ::-1], ends[turned, ::-1]
-    return Sides(vertices, rows.astype(np.int32), ends, facets[there], rows.astype(np.int32))
+    return _Sides(vertices, rows.astype(np.int32), ends, facets[there], rows.astype(np.int32))
 
 
-def edges_of(sides: Sides, lines: Numbers) -> tuple[Numbers, NDArray[np.intp], NDArray[np.int64], Mask]:
+def _edges(sides: _Sides, lines: Numbers) -> tuple[Numbers, NDArray[np.intp], NDArray[np.int64], Mask]:
     """Return the edges (e, 2), the sides of facets edge by edge, how many each has (e,), and which are lines."""
     both = np.concatenate([sides.vertices, np.sort(lines, axis=1)]).astype(np.int64)
     key = both[:, 0] << 32 | both[:, 1]

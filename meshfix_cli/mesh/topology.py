@@ -274,6 +274,16 @@ def rows_of(values: NDArray[_T], which: NDArray[np.int32]) -> NDArray[_T]:
     return np.take(values, which, axis=0)
 
 
+def rows_of_part(
+    offsets: NDArray[np.int32], vertices: NDArray[np.int32], own: int
+) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+    """Return the offsets of compressed rows of some vertices (v,), empty but for the first `own`, and what is there."""
+    counts = np.diff(offsets)[vertices]
+    counts[own:] = 0
+    begins = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return begins, np.arange(begins[-1]) + np.repeat(offsets[vertices] - begins[:-1], counts)
+
+
 def distinct(values: NDArray[_T]) -> NDArray[_T]:
     """Return the different values (k,), ascending: numpy's `unique` imports what takes a twentieth of a small run."""
     ordered = np.sort(values, axis=None)

@@ -23,8 +23,8 @@ from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 
 FREE = "none"  # the name of no array of regions, by which interfaces are freed
-# Reasons to hold vertices that may slide all the same, where they are asked to.
 SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
+# Reasons to hold vertices that may slide all the same, where they are asked to.
 BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
 
 

@@ -19,7 +19,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.faces import Faces
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import SLAB, InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, within
+from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, chain, within
 from meshfix_cli.meshfile.text import Spans, in_line
 
 _SECTION = re.compile(rb"(?:\A(?:\xef\xbb\xbf)?|(?<=[\n\r)]))[ \t]*\([ \t]*(\d{1,4})\s*(?=[\"'(23])")
@@ -159,7 +159,7 @@ def _faces(data: bytes, number: int, at: int, count: int, head: Sequence[int]) -
         end = _behind(data, number, at, 0)
         values = _hexadecimal(data, within(data, at, end))
     if size in _MIXED:
-        rows = _mixed(values, count)
+        rows = chain(values, count, f"there are not the {count:,} faces that are announced", more=3)
         sizes = values[rows]
         inside = np.ones(len(values), dtype=bool)
         inside[rows] = False
@@ -186,19 +186,6 @@ def _binary(data: bytes, number: int, at: int, count: int, size: int) -> tuple[I
     if total > len(words):
         raise ReadError(f"is truncated: section {number} announces {count:,} faces")
     return words[:total].copy(), _behind(data, number, at, 4 * total)
-
-
-def _mixed(values: Int64, count: int) -> Int64:
-    """Return where faces (count,) begin that each tell their size before their nodes and cells."""
-    starts, at, view = [], 0, values.data
-    for _ in range(count):
-        if at >= len(view) or view[at] < 0:
-            break
-        starts.append(at)
-        at += view[at] + 3
-    if len(starts) != count or at != len(view):
-        raise ReadError(f"is not a readable file: there are not the {count:,} faces that are announced")
-    return np.array(starts, dtype=np.int64)
 
 
 def _hexadecimal(data: bytes, spans: Spans) -> Int64:

@@ -43,7 +43,8 @@ def slid(
         Let vertices slide on curved surfaces and along curves, too: those that are there.
     """
     mesh, topology = document.mesh, document.mesh.topology
-    points = mesh.along_curve(mesh.points) if reference is None else reference
+    now = mesh.along_curve(mesh.points)
+    points = now if reference is None else reference
     code = _joint(topology.m, *document.regions) if document.regions else None
     constraints = constraints_of(topology, points, code, tangled)
     cells = _Cells(document, constraints.facets)
@@ -51,9 +52,9 @@ def slid(
     freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines), smooth)
     held = cells.held | _twins(document)
     if reference is not None:
-        held |= topology.of_vertices(freedom.turned(reference, mesh.along_curve(mesh.points)))
+        held |= topology.of_vertices(freedom.turned(reference, now))
     if smooth is not None:
-        held |= topology.of_vertices(freedom.rounded(mesh.along_curve(mesh.points))[1] > smooth.bound)
+        held |= topology.of_vertices(freedom.rounded(now)[1] > smooth.bound)
     for reason, mask in document.holds.items():
         if reason not in (ON_BOUNDARY, ON_CELLS) and not (interfaces and reason.startswith(BETWEEN)):
             held |= mask

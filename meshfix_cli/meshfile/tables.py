@@ -291,22 +291,30 @@ def alike(*kinds: NDArray[Any]) -> Sequence[Int64]:
     return np.split(order, starts) if len(order) else []
 
 
-def chain(numbers: NDArray[np.integer[Any]], count: int, what: str) -> Int64:
-    """Return where (count,) rows begin that each begin with the number of what follows in them.
+def chain(numbers: NDArray[np.integer[Any]], count: int, wrong: str, more: int = 1) -> Int64:
+    """Return where (count,) rows begin that each begin with a number, of what follows but for what all rows have.
+
+    Parameters
+    ----------
+    numbers : (k,) int
+    count : int
+    wrong : str
+        What is said where there are not as many numbers.
+    more : int
+        How many numbers all rows have, that in front included.
 
     Raises
     ------
     ReadError
-        There are not as many numbers; `what` they are.
     """
     starts, at, view = [], 0, numbers.data
     for _ in range(count):
         if at >= len(view) or view[at] < 0:
             break
         starts.append(at)
-        at += view[at] + 1
+        at += view[at] + more
     if len(starts) != count or at != len(view):
-        raise ReadError(f"is not a readable file: the {what} do not add up")
+        raise ReadError(f"is not a readable file: {wrong}")
     return np.array(starts, dtype=np.int64)
 
 

@@ -20,7 +20,7 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import MeshfixError, ReadError, WriteError
+from meshfix_cli.errors import MeshfixError, ReadError, WriteError, together
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
@@ -109,8 +109,7 @@ def _clock_stopped(form: Format) -> Iterator[None]:
 
 def _failing(types: Iterable[str], points: NDArray[np.floating[Any]]) -> str:
     """Say what a writer does not take that fails on no more than some types of cells."""
-    *others, last = sorted(words(key)[1] for key in types) or ["no cells"]
-    plural = f"{', '.join(others)} and {last}" if others else last
+    plural = together(sorted(words(key)[1] for key in types) or ["no cells"])
     plane = max(map(dimension_of, types), default=0) < points.shape[1]
     return f"meshio's writer fails on {plural}{' whose points have three coordinates' if plane else ''}"
 

@@ -147,7 +147,7 @@ def _starts(numbers: Integers, count: int, types: Integers | None) -> NDArray[np
         ends = np.cumsum(sizes + 1)
         if sizes.all() and ends[-1:] == len(numbers) and (numbers[ends - sizes - 1] == sizes).all():
             return ends - sizes - 1
-    return chain(numbers, count, "numbers of vertices of its cells")
+    return chain(numbers, count, "the numbers of vertices of its cells do not add up")
 
 
 def _types(sizes: NDArray[np.int64], other: int, known: dict[int, int]) -> NDArray[np.int64]:

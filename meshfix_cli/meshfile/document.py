@@ -336,7 +336,7 @@ def _solved_points(source: Source, solved: Solved) -> tuple[NDArray[np.float64],
     if vertices.min() < 0 or vertices.max() >= len(points):
         return flat, None  # Mesh.build tells what is wrong, here and below
     used = points[distinct(vertices)]
-    if not np.isfinite(used).all() or not np.ptp(used, axis=0).any():
+    if not (np.abs(used) <= LARGEST_COORDINATE).all() or not np.ptp(used, axis=0).any():
         return flat, None
     basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))
     return _flat(points, basis), basis

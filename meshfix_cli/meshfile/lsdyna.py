@@ -33,6 +33,7 @@ _MORE = {
     "BEAM": ({"THICKNESS"}, {"SCALAR"}, {"OFFSET"}, {"ORIENTATION"}, {"PID"}), "TSHELL": ({"BETA"},),
 }  # fmt: skip
 _NODES = {"SHELL": 8, "SOLID": 10, "TSHELL": 8, "BEAM": 2, "DISCRETE": 2, "SEATBELT": 2}
+_FEWEST = {"SHELL": 3, "SOLID": 4, "TSHELL": 6, "BEAM": 2, "DISCRETE": 1, "SEATBELT": 2}
 _MASS = "ELEMENT_MASS"
 _SETS = {"SET_NODE": "", "SET_SOLID": "SOLID", "SET_SHELL": "SHELL", "SET_PART": "PART"}
 _READ = ("NODE", "PART", "KEYWORD", "END", "TITLE", *_SETS)
@@ -184,6 +185,8 @@ def _add(runs: Runs, text: bytes, block: _Block, points: Numbering) -> None:
     size = size if two or kind != "SOLID" else 8
     if listed.spans is not None:
         size = min(size, listed.spans.shape[1] - first)
+    if size < _FEWEST[kind]:
+        raise in_line(text, block.begin, f"there are fewer than {_FEWEST[kind]} nodes of each element of *{block.name}")
     ids, parts = heads.integers([0, w, 2 * w]).T
     nodes = listed.integers([w * i for i in range(first + size + 1)])[:, first:]
     for key, columns, rows in _types(kind, nodes):

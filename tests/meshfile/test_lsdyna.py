@@ -133,3 +133,10 @@ def test_what_is_wrong_is_named(before: str, after: str, words: str) -> None:
     assert before in SQUARE
     with pytest.raises(ReadError, match=words):
         parse(SQUARE.replace(before, after, 1).encode())
+
+
+@pytest.mark.parametrize(("kind", "fewest"), [("SHELL", 3), ("SOLID", 4)])
+def test_elements_between_commas_with_too_few_nodes_are_refused(tmp_path: Path, kind: str, fewest: int) -> None:
+    text = f"*NODE\n1,0.,0.,0.\n2,1.,0.,0.\n3,0.,1.,0.\n*ELEMENT_{kind}\n1,1,1,2\n*END\n"
+    with pytest.raises(ReadError, match=rf"there are fewer than {fewest} nodes of each element of \*ELEMENT_{kind}"):
+        read_text(tmp_path, text)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from meshfix_cli.errors import ReadError
+from meshfix_cli import read
+from meshfix_cli.errors import MeshfixError, ReadError
 from meshfix_cli.meshfile.plane import plane_basis
 
 
@@ -39,3 +42,11 @@ def test_a_plane_along_the_axes_has_their_bits(random: np.random.Generator) -> N
     points = np.column_stack([random.random((50, 2)), np.full(50, 0.1)])
     points[3, 0] = 1e7
     assert plane_basis(points).tolist() == [[1, 0, 0], [0, 1, 0]]
+
+
+def test_coordinates_that_cannot_be_computed_with_are_refused_before_a_plane_is_looked_for(tmp_path: Path) -> None:
+    points = np.array([[0, 0, 0], [1e200, 0, 1], [0, 1, 1e180], [-1e190, 2, 3]])
+    rows = "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
+    (tmp_path / "in.obj").write_text(f"{rows}f 1 2 3\nf 1 3 4\n")
+    with pytest.raises(MeshfixError, match=r"coordinates beyond 1e\+45 cannot be computed with"):
+        read(tmp_path / "in.obj")

@@ -212,7 +212,9 @@ def _types(kind: str, nodes: Int64) -> Iterator[tuple[str, list[int], Int64]]:
         choices = [("line", 2, there.all(axis=1)), ("vertex", 1, there[:, 0])]
     elif kind == "SHELL":
         more = there[:, 4:].any(axis=1)
-        three = ~more & (~there[:, 3] | (nodes[:, 3] == nodes[:, 2]))
+        three = ~more & (~there[:, 3:4] | (nodes[:, 3:4] == nodes[:, 2:3])).all(
+            axis=1
+        )  # also where there are but three
         choices = [("triangle", 3, three), ("quad", 4, ~more), ("quad_of_8", 4, more)]
     else:
         many = there[:, 8:].any(axis=1)

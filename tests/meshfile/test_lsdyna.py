@@ -140,3 +140,8 @@ def test_elements_between_commas_with_too_few_nodes_are_refused(tmp_path: Path, 
     text = f"*NODE\n1,0.,0.,0.\n2,1.,0.,0.\n3,0.,1.,0.\n*ELEMENT_{kind}\n1,1,1,2\n*END\n"
     with pytest.raises(ReadError, match=rf"there are fewer than {fewest} nodes of each element of \*ELEMENT_{kind}"):
         read_text(tmp_path, text)
+
+
+def test_triangles_between_commas_may_name_three_nodes_alone(tmp_path: Path) -> None:
+    text = "*NODE\n1,0.,0.,0.\n2,1.,0.,0.\n3,0.,1.,0.\n*ELEMENT_SHELL\n1,1,1,2,3\n*END\n"
+    assert [run.type for run in read_text(tmp_path, text).source.cells] == ["triangle"]

@@ -177,6 +177,15 @@ def check_simplices(simplices: Int32, n: int, threads: int) -> tuple[int, int]:
 def used_vertices(simplices: Int32, n: int) -> Int32:
     """Return the vertices of simplices, ascending."""
 
+def arcsin(values: Float64) -> Float64:
+    """The C library's, which has the same bits on all processors: numpy's has not."""
+
+def arccos(values: Float64) -> Float64:
+    """See `arcsin`."""
+
+def sin(values: Float64) -> Float64:
+    """See `arcsin`."""
+
 def check(points: Float64, simplices: Int32, threads: int) -> tuple[Int32, float]:
     """Rows of the inverted simplices, and the smallest signed measure."""
 

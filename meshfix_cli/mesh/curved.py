@@ -281,7 +281,7 @@ class _Solid(_Shaped):
         width = (facets >= 0).sum(axis=1)[rows]
         here = self.points[facets[rows, places]]
         one, other = (_unit(self.points[facets[rows, (places + step) % width]] - here) for step in (1, -1))
-        angle = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
+        angle = kernels.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
         weighted, fan = angle[:, None] * self.units[rows], self.around.fan
         return _unit(np.stack([np.bincount(fan, column, len(fan)) for column in weighted.T], axis=1))
 

@@ -101,7 +101,7 @@ class Judged:
 
 
 def _arc_sines(sines: Array) -> Array:
-    return np.arcsin(np.clip(sines, 0.0, 1.0))
+    return kernels.arcsin(np.clip(sines, 0.0, 1.0))
 
 
 def _offsets(counts: NDArray[np.integer]) -> NDArray[np.int32]:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli import kernels
 from meshfix_cli.quality.formulas import evaluate
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ class Compared:
             least = np.maximum(least, np.minimum(self._values, self._least[4]))
         for _ in range(RETREATS):
             verdicts, _, qualities = self._elements.judge(points, self._threads)
-            worse = (verdicts != 0) | (np.sin(qualities) < self._least[1] - SAME)
+            worse = (verdicts != 0) | (kernels.sin(qualities) < self._least[1] - SAME)
             worse |= self._jacobians(points) < least - SAME
             if not self._team.total(int(worse[self._own].sum())):
                 return points
@@ -121,7 +122,7 @@ class Compared:
 
     def _figures_of(self, jacobians: Array, angles: Array) -> Figures:
         """Return the smallest scaled Jacobian with and without centres, the means of both, and the first percentile."""
-        own, corners = jacobians[self._own], np.sin(angles[self._own])
+        own, corners = jacobians[self._own], kernels.sin(angles[self._own])
         count = max(1, self._team.total(len(own)))
         means = [self._team.total(int((one * STEPS).astype("i8").sum())) / STEPS / count for one in (own, corners)]
         least = [self._team.least(float(one.min(initial=1.0))) for one in (own, corners)]

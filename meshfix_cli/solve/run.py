@@ -357,13 +357,13 @@ class Run:
         from meshfix_cli.solve import even
 
         angles = self._angles(self.points)
-        total, smallest = self.team.total(self._steps(np.sin(angles))), math.sin(self._least(angles))
+        total, smallest = self.team.total(self._steps(kernels.sin(angles))), math.sin(self._least(angles))
         mean = total / ANGLE_STEPS / self.count
         aims = Goal(math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT, 0.0, max(self.min_measure, 0.0))
         compute = partial(even.evened_where_poor, smallest, mean, aims, self.threads, self.team.freedom)
         for points in self._of_whole(compute, self.points, self.together):
             there = self._angles(points)
-            if math.sin(self._least(there)) > smallest and self.team.total(self._steps(np.sin(there))) > total:
+            if math.sin(self._least(there)) > smallest and self.team.total(self._steps(kernels.sin(there))) > total:
                 yield points
 
     def compare(self) -> bool:

@@ -44,8 +44,9 @@ def steps(
     phase goes up to the ceiling, and any valid mesh where there is a reference.
 
     A phase that starts from the best mesh where that is not the last one begins with a record of phase "best";
-    smoothing does. The last mesh is never worse than the first, by (inverted elements, smallest measure); where phases
-    that go up to the ceiling gain nothing, it is the first.
+    smoothing does. The last mesh is never worse than the first: by inverted elements, then by the smallest measure or,
+    where meshes are compared by their scaled Jacobians, by these. Where phases that go up to the ceiling gain nothing,
+    it is the first.
 
     Parameters
     ----------
@@ -117,7 +118,10 @@ def steps(
         yield run.mesh, run.record
     if run.take_compared():
         yield run.mesh, run.record
-    lost = run.record.rank > run.first[1].rank or (to_the_ceiling and run.first[1].inverted == 0 and not run.gained())
+    first, last = run.first[1], run.record
+    # What was compared is no worse than the default in its scaled Jacobians, which tell more than the smallest measure.
+    worse = last.rank > first.rank if run.compared is None else last.inverted > first.inverted
+    lost = worse or (to_the_ceiling and first.inverted == 0 and not run.gained())
     if lost and run.go_back(untangling=False):
         yield run.mesh, run.record
 

@@ -96,6 +96,14 @@ auto judge_py(const Matrix<const double>& points, const Vector<const std::uint8_
                            to_numpy(std::move(found.quality)));
 }
 
+// Functions of the C library, element by element: numpy's own have other last bits where a processor has wider vectors.
+template <double (*F)(double)>
+auto of_each_py(const Vector<const double>& values) {
+    std::vector<double> found(values.shape(0));
+    std::transform(values.data(), values.data() + found.size(), found.begin(), F);
+    return to_numpy(std::move(found));
+}
+
 // The nodes of one element.
 template <int D>
 std::array<Vec<D>, MOST_NODES> nodes_of(const Matrix<const double>& rows) {
@@ -155,6 +163,9 @@ void bind_measures(nb::module_& m) {
     m.def("coefficients", &coefficients_py, "nodes"_a.noconvert(), "code"_a);
     m.def("coefficient_columns", &coefficient_columns_py, "nodes"_a.noconvert(), "code"_a, "node"_a);
     m.attr("SHAPES") = nb::cast(shapes_py());
+    m.def("arcsin", &of_each_py<std::asin>, "values"_a.noconvert());
+    m.def("arccos", &of_each_py<std::acos>, "values"_a.noconvert());
+    m.def("sin", &of_each_py<std::sin>, "values"_a.noconvert());
     m.def("sines", &sines_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
 }
 

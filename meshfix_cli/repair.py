@@ -282,6 +282,7 @@ class Judge:
             obstacles=find_obstacles(result, self.threads) if obstacles is None else obstacles,
             fixed=document.fixed,
             not_judged=document.not_judged,
+            higher_order=document.higher_order,
             notes=(*document.notes, *notes),
             requirements=self.requirements,
             **more,

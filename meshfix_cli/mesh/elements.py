@@ -1,7 +1,8 @@
 """The one table of element types: what they are called, what their facets are, and which of them are solved for.
 
-A type that is known and not judged is held where it stands beside elements that are. Corner nodes have the order of
-gmsh, which is that of VTK's parametric coordinates. Light to import.
+A type that is known and not judged is held where it stands beside elements that are; one of second order is judged as
+the linear one of its corners where its other nodes lie between these. Corner nodes have the order of gmsh, which is
+that of VTK's parametric coordinates, and other nodes that of VTK. Light to import.
 
 Source: VTK, "vtkCellType.h" and its classes of cells; "Gmsh Reference Manual", section "Node ordering"; for the weights
 Stimpson, Ernst, Knupp, Pebay, Thompson, "The Verdict Geometric Quality Library", SAND2007-1751.
@@ -12,16 +13,16 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from functools import cached_property
 
 Rows = tuple[tuple[int, ...], ...]
+Weights = tuple[tuple[float, ...], ...]
 MEASURES = {1: "length", 2: "area", 3: "volume"}
 
 
 @dataclass(frozen=True, eq=False)
 class Shape:
     """What the types of one shape have in common, whatever their order.
-
-    Of those that are held only the words and the dimension are used yet.
 
     Attributes
     ----------
@@ -95,7 +96,10 @@ class Element:
         The numbers by which these know it.
     judged_by : {"determinant", "corners", "coefficients"} or None
         What decides whether it is valid: the one determinant, those of the corner simplices, or the Bezier coefficients
-        of the Jacobian determinant; None: it is held, and not judged.
+        of the Jacobian determinant; None: it is held, and not judged, but for what `straight` tells.
+    between : str
+        For each node that is no corner a word: the corners in whose middle it lies where the element is straight. One
+        that counts twice stands there twice.
     """
 
     key: str
@@ -104,11 +108,36 @@ class Element:
     vtk: int | None = None
     gmsh: int | None = None
     judged_by: str | None = None
+    between: str = ""
 
     @property
     def linear(self) -> bool:
         """Whether its nodes are its corners."""
         return self.nodes == self.shape.corners
+
+    @property
+    def straight(self) -> Element | None:
+        """The judged type of its corners, of which it is a refinement where its other nodes lie between them."""
+        if self.judged_by:
+            return self
+        return next((one for one in JUDGED if one.shape is self.shape), None) if self.between else None
+
+    @cached_property
+    def weights(self) -> Weights:
+        """(nodes - corners, corners): where its other nodes lie if it is straight, as weights of its corners.
+
+        They are the values that the shape functions of the linear element have there.
+        """
+        words, corners = self.between.split(), range(self.shape.corners)
+        return tuple(tuple(word.count(str(corner)) / len(word) for corner in corners) for word in words)
+
+    @cached_property
+    def mirrored(self) -> tuple[int, ...]:
+        """An order of all nodes that has the other orientation: corners as `Shape.mirrored`, and what is between."""
+        corners = self.shape.mirrored
+        there = {weights: place for place, weights in enumerate(self.weights, self.shape.corners)}
+        others = (tuple(weights[corners.index(corner)] for corner in range(len(corners))) for weights in self.weights)
+        return (*corners, *(there[weights] for weights in others))
 
 
 _VERTEX = Shape("vertex", "vertices", 0, 1)
@@ -167,32 +196,38 @@ _VOXEL = Shape("voxel", "voxels", 3, 0)
 _STRIP = Shape("strip of triangles", "strips of triangles", 2, 0)
 _POLYGON = Shape("polygon", "polygons", 2, 0)
 _POLYHEDRON = Shape("polyhedron", "polyhedra", 3, 0)
+# Between which corners the nodes of second order lie: on edges, in faces.
+_ON_TRIANGLE, _ON_QUAD, _ON_TETRA = "01 12 20", "01 12 23 30", "01 12 20 03 13 23"
+_ON_PYRAMID, _ON_WEDGE = "01 12 23 30 04 14 24 34", "01 12 20 34 45 53 03 14 25"
+_ON_HEXAHEDRON = "01 12 23 30 45 56 67 74 04 15 26 37"
+_IN_PYRAMID = "0001112223334444"  # a quarter of the way from the base to the apex
+_IN_HEXAHEDRON = "0473 1265 0154 3762 0321 4567 01234567"
 _TABLE = (
     Element("vertex", _VERTEX, 1, vtk=1, gmsh=15),
     Element("line", _LINE, 2, vtk=3, gmsh=1),
-    Element("line3", _LINE, 3, vtk=21, gmsh=8),
-    Element("line4", _LINE, 4, vtk=35, gmsh=26),
+    Element("line3", _LINE, 3, vtk=21, gmsh=8, between="01"),
+    Element("line4", _LINE, 4, vtk=35, gmsh=26, between="001 011"),
     Element("triangle", _TRIANGLE, 3, vtk=5, gmsh=2, judged_by="determinant"),
-    Element("triangle6", _TRIANGLE, 6, vtk=22, gmsh=9),
-    Element("triangle7", _TRIANGLE, 7, vtk=34),
+    Element("triangle6", _TRIANGLE, 6, vtk=22, gmsh=9, between=_ON_TRIANGLE),
+    Element("triangle7", _TRIANGLE, 7, vtk=34, between=f"{_ON_TRIANGLE} 012"),
     Element("quad", _QUAD, 4, vtk=9, gmsh=3, judged_by="corners"),
-    Element("quad6", _QUAD, 6, vtk=30),
-    Element("quad8", _QUAD, 8, vtk=23, gmsh=16),
-    Element("quad9", _QUAD, 9, vtk=28, gmsh=10),
+    Element("quad6", _QUAD, 6, vtk=30, between="01 23"),
+    Element("quad8", _QUAD, 8, vtk=23, gmsh=16, between=_ON_QUAD),
+    Element("quad9", _QUAD, 9, vtk=28, gmsh=10, between=f"{_ON_QUAD} 0123"),
     Element("tetra", _TETRA, 4, vtk=10, gmsh=4, judged_by="determinant"),
-    Element("tetra10", _TETRA, 10, vtk=24, gmsh=11),
+    Element("tetra10", _TETRA, 10, vtk=24, gmsh=11, between=_ON_TETRA),
     Element("pyramid", _PYRAMID, 5, vtk=14, gmsh=7, judged_by="corners"),
-    Element("pyramid13", _PYRAMID, 13, vtk=27, gmsh=19),
-    Element("pyramid14", _PYRAMID, 14, gmsh=14),
-    Element("pyramid19", _PYRAMID, 19, vtk=37),
+    Element("pyramid13", _PYRAMID, 13, vtk=27, gmsh=19, between=_ON_PYRAMID),
+    Element("pyramid14", _PYRAMID, 14, gmsh=14, between=f"{_ON_PYRAMID} 0123"),
+    Element("pyramid19", _PYRAMID, 19, vtk=37, between=f"{_ON_PYRAMID} 0123 014 124 234 304 {_IN_PYRAMID}"),
     Element("wedge", _WEDGE, 6, vtk=13, gmsh=6, judged_by="coefficients"),
-    Element("wedge12", _WEDGE, 12, vtk=31),
-    Element("wedge15", _WEDGE, 15, vtk=26, gmsh=18),
-    Element("wedge18", _WEDGE, 18, vtk=32, gmsh=13),
+    Element("wedge12", _WEDGE, 12, vtk=31, between="01 12 20 34 45 53"),
+    Element("wedge15", _WEDGE, 15, vtk=26, gmsh=18, between=_ON_WEDGE),
+    Element("wedge18", _WEDGE, 18, vtk=32, gmsh=13, between=f"{_ON_WEDGE} 0143 1254 2035"),
     Element("hexahedron", _HEXAHEDRON, 8, vtk=12, gmsh=5, judged_by="coefficients"),
-    Element("hexahedron20", _HEXAHEDRON, 20, vtk=25, gmsh=17),
-    Element("hexahedron24", _HEXAHEDRON, 24, vtk=33),
-    Element("hexahedron27", _HEXAHEDRON, 27, vtk=29, gmsh=12),
+    Element("hexahedron20", _HEXAHEDRON, 20, vtk=25, gmsh=17, between=_ON_HEXAHEDRON),
+    Element("hexahedron24", _HEXAHEDRON, 24, vtk=33, between=f"{_ON_HEXAHEDRON} 0473 1265 0154 3762"),
+    Element("hexahedron27", _HEXAHEDRON, 27, vtk=29, gmsh=12, between=f"{_ON_HEXAHEDRON} {_IN_HEXAHEDRON}"),
     Element("triangle_strip", _STRIP, 0, vtk=6),
     Element("polygon", _POLYGON, 0, vtk=7),
     Element("pixel", _PIXEL, 4, vtk=8),
@@ -219,19 +254,32 @@ _FAMILIES = {
 }
 
 
+def element_of(key: str) -> Element | None:
+    """Return the type that a file's cells are named by; None: no more is known of it than its name tells."""
+    return ELEMENTS.get(key)
+
+
+def straight_key(key: str) -> str | None:
+    """Return the judged type of the corners of a type, see `Element.straight`."""
+    element = element_of(key)
+    straight = None if element is None else element.straight
+    return None if straight is None else straight.key
+
+
 def dimension_of(key: str) -> int:
     """Return the dimension of a type, by its name where it is not in the table; 0 where that tells nothing."""
-    if key in ELEMENTS:
-        return ELEMENTS[key].shape.dimension
+    element = element_of(key)
+    if element is not None:
+        return element.shape.dimension
     name = re.sub("^vtk_[a-z]+_", "", key.lower())
     return next((dimension for dimension, names in _FAMILIES.items() if name.startswith(names)), 0)
 
 
 def words(key: str) -> tuple[str, str]:
     """Return what one element, and what several, of a type are called."""
-    if key not in ELEMENTS:
+    element = element_of(key)
+    if element is None:
         return f"{key} element", f"{key} elements"
-    element = ELEMENTS[key]
     order = "" if element.linear or not element.shape.corners else f" of {element.nodes} nodes"
     return f"{element.shape.name}{order}", f"{element.shape.plural}{order}"
 

@@ -5,27 +5,32 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
-from meshfix_cli.mesh.elements import counted, dimension_of
+from meshfix_cli.mesh.elements import counted, dimension_of, words
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
-from meshfix_cli.meshfile.coincident import count, first_of_each_place
-from meshfix_cli.meshfile.formats import DRAWINGS, Format
+from meshfix_cli.meshfile.coincident import first_of_each_place
+from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.notes import concave, notes_on
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.ties import Ties
+
 FREE = "none"  # the name of no array of regions, by which interfaces are freed
 SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
 # Reasons to hold vertices that may slide all the same, where they are asked to.
 BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
+HALFWAY = "between corners of other elements"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +63,8 @@ class Document:
         For each point the one that stands for it in the mesh, where points at one place are joined.
     arbitrary : (m,) bool or None
         The elements that are numbered the other way round, where the file's numbering says nothing of that.
+    ties : Ties or None
+        Which nodes lie between the corners of elements of second order, and follow these; None: there are none.
     """
 
     name: str
@@ -73,6 +80,7 @@ class Document:
     regions: tuple[NDArray[np.int64], ...] = field(repr=False)
     copies: NDArray[np.int64] | None = None
     arbitrary: NDArray[np.bool_] | None = None
+    ties: Ties | None = field(default=None, repr=False)
 
     @property
     def fixed(self) -> dict[str, int]:
@@ -93,6 +101,15 @@ class Document:
     def parts(self) -> tuple[Part, ...]:
         """The elements of the mesh, without repetitions, with their vertices as the file numbers them."""
         return self.solved.some(self.mesh.topology.source)
+
+    @property
+    def higher_order(self) -> dict[str, int]:
+        """Number of elements of each type that has more nodes than corners."""
+        counts: dict[str, int] = {}
+        for part in () if self.ties is None else self.parts:
+            if part.type != part.key:
+                counts[part.type] = counts.get(part.type, 0) + len(part.vertices)
+        return counts
 
     def groups(self) -> dict[str, dict[int, int]]:
         """Return how many cells each group of the file has, by name and by dimension, see `groups.Group.counts`."""
@@ -122,6 +139,10 @@ class Document:
         if self.copies is not None:
             behind = np.flatnonzero(moved[self.copies] & ~mesh.topology.used)
             points[behind] = points[self.copies[behind]]
+        if self.ties is not None:
+            followed = self.ties.follow(points, moved)
+            if not self.source.exact:
+                points[followed] = self.source.rounded(points[followed])
         return points
 
     def as_stored(self, mesh: Mesh) -> Mesh:
@@ -231,14 +252,20 @@ def build(
             raise ReadError(f"the cell data {key!r} are not labels of regions: they have {components}")
         between.append(_region_codes(labels, solved, topology))
         holds[f"{BETWEEN} {key}"] = topology.interface(between[-1])
+    ties, curved = solved.ties(source.points)
+    if curved.any():
+        raise _curved(solved, curved)
     if copies is not None:
         held = {reason: _of_copies(mask, copies) for reason, mask in held.items()}
+    if ties is not None:
+        held[HALFWAY] = ties.nodes & topology.used
+        held = {reason: ties.with_corners(mask) for reason, mask in held.items()}
     holds |= held
     for mask in holds.values():
         mesh = mesh.with_fixed(mask)
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
     seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
-    notes = (*source.notes, *_notes(mesh, solved, seen_from_above, copies), *_concave(mesh, form))
+    notes = (*source.notes, *notes_on(mesh, solved, seen_from_above, copies, ties), *concave(mesh, form))
     notes += tuple(f"--fix {one} holds no vertex: there is none in it" for one, mask in named.items() if not mask.any())
     ids = solved.of_elements(_ids(source))
     ids = ids if topology.m == len(ids) else ids[topology.source]
@@ -256,6 +283,7 @@ def build(
         tuple(between),
         copies,
         arbitrary,
+        ties,
     )
 
 
@@ -278,6 +306,17 @@ def _solved(source: Source) -> Solved:
     solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
     raise ReadError(f"there are no linear solid elements and no plane mesh of linear elements in it (cells: {found})")
+
+
+def _curved(solved: Solved, curved: NDArray[np.bool_]) -> ReadError:
+    """Return the complaint about elements, marked (m,), whose nodes are not all where straight elements have them."""
+    kinds = [part.type for part in solved.some(np.flatnonzero(curved)) if len(part.vertices)]
+    named = listed([words(kind)[1] for kind in dict.fromkeys(kinds)])
+    count = int(curved.sum())
+    return ReadError(
+        f"{count:,} of {counted(solved.m, 'element', 'elements')} {'is' if count == 1 else 'are'} curved ({named}): "
+        "elements of second order are solved where their other nodes lie in the middle between corners"
+    )
 
 
 def _ids(source: Source) -> list[NDArray[np.int64]]:
@@ -394,61 +433,3 @@ def _with_regions(source: Source, name: str) -> Source:
         known = listed(sorted(source.arrays.cell)) or "none"
         raise ReadError(f"there is no cell data named {name!r} (found: {known})")
     return replace(source, regions=(name,), load=lambda: source.arrays)
-
-
-def _notes(mesh: Mesh, solved: Solved, seen_from_above: bool, copies: NDArray[np.int64] | None) -> tuple[str, ...]:
-    topology, shape = mesh.topology, mesh.topology.element.shape
-    one, many = shape.name, shape.plural
-    notes = []
-    if topology.m < solved.m:
-        repeated = counted(solved.m - topology.m, f"{one} is a repetition", f"{many} are repetitions")
-        notes.append(f"{repeated} of another and not counted")
-    first = first_of_each_place(mesh.points, np.flatnonzero(topology.boundary)) if copies is None else copies
-    together, places = count(first)
-    if together and copies is None:
-        counts = f"{together:,} points lie at {counted(places, 'place', 'places')}"
-        notes.append(f"{counts} and are not joined; --join-points treats those of one place as one")
-    elif together:
-        notes.append(f"joined {together:,} points at {counted(places, 'place', 'places')}; each is written")
-    isolated = topology.n - int(topology.used.sum()) - (together - places if copies is not None else 0)
-    if isolated:
-        notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
-    mirrored, which = int(topology.mirrored.sum()), ""
-    if mirrored == topology.m and seen_from_above:
-        which = "the element is" if mirrored == 1 else "the elements are"
-    elif 0 < mirrored < topology.m:
-        which = _types_mirrored(topology) or counted(
-            mirrored, f"{one} in a separate part is", f"{many} in separate parts are"
-        )
-    if which:
-        kept = "solved so, and the numbering is kept; --fix-orientation would turn it"
-        notes.append(f"{which} numbered the other way round (mirrored): {kept}")
-    if not mesh.movable.any():
-        notes.append("no vertex is free to move")
-    return tuple(notes)
-
-
-def _types_mirrored(topology: Topology) -> str:
-    """Name the types that are all numbered the other way round; empty: also others are."""
-    whole = [block for block in topology.blocks if topology.mirrored[block.rows].all()]
-    if sum(len(block.rows) for block in whole) < topology.mirrored.sum():
-        return ""
-    named = [counted(len(block.rows), block.element.shape.name, block.element.shape.plural) for block in whole]
-    return f"{' and '.join(named)} {'is' if len(whole) == len(whole[0].rows) == 1 else 'are'}"
-
-
-def _concave(mesh: Mesh, form: Format) -> tuple[str, ...]:
-    """Say that there are concave quadrilaterals where these may be meant."""
-    if form.name not in DRAWINGS:
-        return ()
-    concave = 0
-    for block in mesh.topology.blocks:
-        if block.element.key == "quad":
-            p = mesh.points[block.vertices]
-            ahead, behind = np.roll(p, -1, axis=1) - p, np.roll(p, 1, axis=1) - p
-            corners = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
-            # Where two corners are inside out, sides cross.
-            concave += int((((corners <= 0).sum(axis=1) == 1) & (corners.sum(axis=1) > 0)).sum())
-    if not concave:
-        return ()
-    return (f"{counted(concave, 'quadrilateral is', 'quadrilaterals are')} concave, and a concave one is inverted",)

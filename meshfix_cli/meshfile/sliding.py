@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import ELEMENTS, dimension_of
+from meshfix_cli.mesh.elements import element_of
 from meshfix_cli.mesh.freedom import constraints_of, freedom_of
 from meshfix_cli.mesh.mesh import ON_BOUNDARY
 from meshfix_cli.meshfile.coincident import first_of_each_place
@@ -51,6 +51,8 @@ def slid(
     labels = _joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
     freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines), smooth)
     held = cells.held | _twins(document)
+    if document.ties is not None:
+        held = document.ties.with_corners(held)
     if reference is not None:
         held |= topology.of_vertices(freedom.turned(reference, now))
     if smooth is not None:
@@ -98,8 +100,8 @@ class _Cells:
         mesh, topology = document.mesh, document.mesh.topology
         solved = {part.run for part in document.solved.parts}
         runs = [i for i, run in enumerate(document.source.cells) if i not in solved and len(run.vertices)]
-        flat = [i for i in runs if _is_linear(document, i, mesh.dimension - 1)]
-        lines = [i for i in runs if mesh.dimension == 3 and _is_linear(document, i, 1)]
+        flat = [i for i in runs if _is_straight(document, i, mesh.dimension - 1)]
+        lines = [i for i in runs if mesh.dimension == 3 and _is_straight(document, i, 1)]
         self.held = np.zeros(topology.n, dtype=bool)
         for run in (document.source.cells[i] for i in runs if i not in (*flat, *lines)):
             self._hold(np.concatenate([np.ravel(row) for row in run.vertices]).astype(np.int64))
@@ -114,8 +116,13 @@ class _Cells:
         self.held[vertices[(vertices >= 0) & (vertices < len(self.held))]] = True
 
     def _in_mesh(self, document: Document, run: int) -> NDArray[np.int32]:
-        """Return the cells (c, w) of a run in the numbers of the connectivity; those with other points are held."""
-        topology, vertices = document.mesh.topology, np.asarray(document.source.cells[run].vertices)
+        """Return the corners of the cells (c, w) of a run in the numbers of the connectivity.
+
+        Those with other points are held.
+        """
+        topology, cells = document.mesh.topology, document.source.cells[run]
+        element = element_of(cells.type)
+        vertices = np.asarray(cells.vertices)[:, : None if element is None else element.shape.corners]
         inside = (vertices >= 0) & (vertices < topology.n)
         used = np.asarray((topology.used[np.where(inside, vertices, 0)] & inside).all(axis=1))
         self._hold(vertices[~used].ravel())
@@ -144,10 +151,15 @@ class _Cells:
         self._hold(document.mesh.topology.connectivity.vertices[lost[lost >= 0]].astype(np.int64))
 
 
-def _is_linear(document: Document, run: int, dimension: int) -> bool:
+def _is_straight(document: Document, run: int, dimension: int) -> bool:
+    """Whether cells have a dimension and no other nodes than corners, or such as follow those of elements."""
     cells = document.source.cells[run]
-    element = ELEMENTS.get(cells.type)
-    return element is not None and element.linear and dimension_of(cells.type) == dimension
+    element = element_of(cells.type)
+    if element is None or not element.shape.corners or element.shape.dimension != dimension:
+        return False
+    others = np.asarray(cells.vertices)[:, element.shape.corners :]
+    inside = (others >= 0) & (others < document.mesh.topology.n)
+    return element.linear or (document.ties is not None and bool(inside.all() and document.ties.nodes[others].all()))
 
 
 def _ascending(rows: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -1,6 +1,7 @@
-"""What is solved for of the cells of a file: all elements of its highest dimension whose nodes are their corners.
+"""What is solved for of the cells of a file: all elements of its highest dimension, by their corners.
 
-Cells that other programs number in their own way, pixels, voxels and strips of triangles, become what they are, and so
+Those of second order have more nodes than corners; where these lie between the corners, they follow them. Cells that
+other programs number in their own way, pixels, voxels and strips of triangles, become what they are, and so
 do cells that name a vertex several times: a hexahedron of which two opposite faces have lost an edge is a wedge.
 
 Source: VTK, "vtkCellType.h"; for the repeated nodes "LS-DYNA Keyword User's Manual", *ELEMENT_SOLID, and "Ansys
@@ -10,18 +11,21 @@ Mechanical APDL Element Reference", SOLID185, whose rules are cases of the one t
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import permutations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError, ReadError
-from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, SIMPLICES, dimension_of
+from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, SIMPLICES, Element, dimension_of, element_of, straight_key
 from meshfix_cli.meshfile.source import Cells
 from meshfix_cli.meshfile.splice import Turned
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.ties import Ties
 
 Int64 = NDArray[np.int64]
 Facet = tuple[int, ...]
@@ -29,7 +33,6 @@ Facet = tuple[int, ...]
 _STRIP = "triangle_strip"
 # Types with an order of their own: what they are, and which of their vertices stands where.
 _REORDERED = {"pixel": ("quad", (0, 1, 3, 2)), "voxel": ("hexahedron", (0, 1, 3, 2, 4, 5, 7, 6))}
-_CELL_TYPES = frozenset((*(element.key for element in JUDGED), *_REORDERED, _STRIP))
 _SIMPLICES = frozenset(element.key for element in SIMPLICES.values())
 
 
@@ -41,17 +44,34 @@ class Part:
     ----------
     key : str
         The type, one of `elements.JUDGED`.
-    vertices : (k, nodes) int
+    vertices : (k, corners) int
     run : int
         The number of the run.
     rows : (k,) int64 or None
         Which cells of the run they are; None: all, one by one.
+    refined : Element or None
+        The type of the cells, where these have more nodes than corners.
+    nodes : (k, nodes) int or None
+        All of their nodes then.
     """
 
     key: str
     vertices: NDArray[np.integer[Any]]
     run: int
     rows: Int64 | None = None
+    refined: Element | None = None
+    nodes: NDArray[np.integer[Any]] | None = None
+
+    @property
+    def type(self) -> str:
+        """The type of the cells, but for collapsed ones, which are called after what is left of their corners."""
+        return self.key if self.refined is None or self.refined.straight != ELEMENTS[self.key] else self.refined.key
+
+    def at(self, here: NDArray[np.integer[Any]]) -> Part:
+        """Return some of the elements, by their positions."""
+        rows = here.astype(np.int64, copy=False) if self.rows is None else self.rows[here]
+        nodes = None if self.nodes is None else self.nodes[here]
+        return replace(self, vertices=self.vertices[here], rows=rows, nodes=nodes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +116,7 @@ class Solved:
         ends, found = np.searchsorted(elements, starts), []
         for i, part in enumerate(self.parts):
             here = elements[ends[i] : ends[i + 1]] - starts[i]
-            rows = here if part.rows is None else part.rows[here]
-            whole = len(here) == len(part.vertices)
-            found.append(part if whole else Part(part.key, part.vertices[here], part.run, rows))
+            found.append(part if len(here) == len(part.vertices) else part.at(here))
         return tuple(found)
 
     def of_elements(self, values: Sequence[NDArray[Any]]) -> NDArray[Any]:
@@ -108,6 +126,27 @@ class Solved:
     def vertices(self) -> Int64:
         """Return the vertices of all elements, one behind the other."""
         return _joined([part.vertices.ravel() for part in self.parts])
+
+    def ties(self, points: NDArray[np.floating[Any]]) -> tuple[Ties | None, NDArray[np.bool_]]:
+        """Find the nodes that follow corners, None: there are none, and mark the curved elements (m,).
+
+        Those are not what their corners tell: at points (n, d) they have a node elsewhere than between these.
+
+        Raises
+        ------
+        InvalidMeshError
+            See `ties.ties_of` and `ties.curved`.
+        """
+        if all(part.nodes is None for part in self.parts):
+            return None, np.zeros(self.m, dtype=bool)
+        from meshfix_cli.mesh.ties import curved, ties_of
+
+        blocks = [
+            (part.refined or ELEMENTS[part.key], part.vertices if part.nodes is None else part.nodes)
+            for part in self.parts
+        ]
+        ties, at_odds = ties_of(blocks, len(points))
+        return ties, at_odds | curved(blocks, ties, points)
 
     def not_judged(self) -> dict[str, int]:
         """Count, by their types, the cells of the mesh's dimension that are not solved for."""
@@ -137,7 +176,7 @@ def solved_runs(cells: Sequence[Cells]) -> list[int]:
     """Return the numbers of the runs that hold what is solved for."""
     filled = [i for i, run in enumerate(cells) if len(run.vertices)]
     highest = max((dimension_of(cells[i].type) for i in filled), default=0)
-    return [i for i in filled if cells[i].type in _CELL_TYPES and dimension_of(cells[i].type) == highest]
+    return [i for i in filled if dimension_of(cells[i].type) == highest and _key_of(cells[i].type)]
 
 
 def solved_of(cells: Sequence[Cells]) -> Solved:
@@ -151,10 +190,10 @@ def solved_of(cells: Sequence[Cells]) -> Solved:
         An element names a vertex twice and is nothing without it.
     """
     chosen = solved_runs(cells)
-    types = {cells[i].type for i in chosen}
+    keys = {_key_of(cells[i].type) for i in chosen}
     rest = [run for i, run in enumerate(cells) if i not in chosen]
-    if len(types) == 1 and types <= _SIMPLICES:
-        return Solved(tuple(Part(cells[i].type, cells[i].vertices, i) for i in chosen), tuple(rest))
+    if len(keys) == 1 and keys <= _SIMPLICES:
+        return Solved(tuple(_plainly(cells[i], i) for i in chosen), tuple(rest))
     starts = np.cumsum([0, *(len(run.vertices) for run in cells)])
     parts: list[Part] = []
     for i in chosen:
@@ -164,6 +203,11 @@ def solved_of(cells: Sequence[Cells]) -> Solved:
             else:
                 rest.append(Cells(part.key, part.vertices))
     return Solved(tuple(parts), tuple(rest))
+
+
+def _key_of(kind: str) -> str | None:
+    """Return what cells of a type are solved as: a key of `elements.JUDGED`, or a type of VTK's; None: as nothing."""
+    return kind if kind in _REORDERED or kind == _STRIP else straight_key(kind)
 
 
 def ids_of(run: Cells, start: int) -> Int64:
@@ -185,7 +229,7 @@ def turned(cells: Sequence[Cells], rows: Mapping[int, Int64]) -> dict[int, Turne
         if key == _STRIP and len(here):
             raise ReadError("has strips of triangles, of which none can be renumbered alone")
         if len(here):
-            found[run] = Turned(np.sort(here), ELEMENTS[key].shape.mirrored)
+            found[run] = Turned(np.sort(here), ELEMENTS[key].mirrored)
     return found
 
 
@@ -202,7 +246,11 @@ def _plainly(run: Cells, number: int) -> Part:
     if run.type == _STRIP:
         return _of_strips(run.vertices, number)
     common = in_common_types(run)
-    return Part(common.type, common.vertices, number)
+    element = element_of(common.type)
+    if element is None or element.straight in (None, element):
+        return Part(common.type, common.vertices, number)
+    corners = common.vertices[:, : element.shape.corners]
+    return Part(element.straight.key, corners, number, refined=element, nodes=common.vertices)
 
 
 def _of_strips(strips: NDArray[np.integer[Any]], number: int) -> Part:
@@ -220,9 +268,8 @@ def _parts(part: Part, run: Cells, start: int) -> Iterator[Part]:
     if not repeated.any():
         yield part
         return
-    rows = np.arange(len(part.vertices)) if part.rows is None else part.rows
     if not repeated.all():
-        yield Part(part.key, part.vertices[~repeated], part.run, rows[~repeated])
+        yield part.at(np.flatnonzero(~repeated))
     at = np.flatnonzero(repeated)
     # For each vertex the position where the element names it first.
     first = (part.vertices[at][:, :, None] == part.vertices[at][:, None, :]).argmax(axis=2)
@@ -233,17 +280,18 @@ def _parts(part: Part, run: Cells, start: int) -> Iterator[Part]:
         here = at[which == i]
         key, order = _without_repetitions(part.key, tuple(pattern))
         if not order:
-            number, named = ids_of(run, start)[rows[here[0]]], part.vertices[here[0]].tolist()
+            row = here[0] if part.rows is None else part.rows[here[0]]
+            number, named = ids_of(run, start)[row], part.vertices[here[0]].tolist()
             raise InvalidMeshError(f"element {number} names a vertex twice: {named}")
         found.setdefault(key, []).append((here, part.vertices[here][:, order]))
     for key, pieces in found.items():
         if len({vertices.shape[1] for _, vertices in pieces}) > 1:  # collapsed ones of no type
-            yield from (Part(key, vertices, part.run, rows[here]) for here, vertices in pieces)
+            yield from (replace(part.at(here), key=key, vertices=vertices) for here, vertices in pieces)
             continue
         here = np.concatenate([here for here, _ in pieces])
         ascending = np.argsort(here)
         vertices = np.concatenate([vertices for _, vertices in pieces])
-        yield Part(key, vertices[ascending], part.run, rows[here[ascending]])
+        yield replace(part.at(here[ascending]), key=key, vertices=vertices[ascending])
 
 
 def _repeats(vertices: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:

@@ -29,14 +29,25 @@ from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.solved import solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 
+# Of types that some of its writers know meshio has no dimension, and takes no cells of them.
+for _element in ELEMENTS.values():
+    if _element.between:
+        meshio._mesh.topological_dimension.setdefault(_element.key, _element.shape.dimension)
 # Cells that meshio knows, and those that most formats do; others are left out of what it writes.
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
 _OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
 _MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
-# Of the elements of one shape meshio names a rigid one, one with the pressure of pores, and a hybrid one.
-_PLAIN = {b"R3D3": b"CPS3", b"CAX4P": b"CPS4", b"C3D8RH": b"C3D8"}
+# Of the elements of one shape meshio names a rigid one, one with the pressure of pores, a hybrid one; some it invents.
+_PLAIN = {
+    "abaqus": {
+        b"R3D3": b"CPS3", b"CAX4P": b"CPS4", b"C3D8RH": b"C3D8", b"CPE6": b"CPS6", b"S8R5": b"CPS8",
+        b"C3D10MH": b"C3D10", b"C3D20RH": b"C3D20",
+    },
+    "nastran": {b"CTETRA_": b"CTETRA ", b"CPYRA_": b"CPYRA ", b"CPENTA_": b"CPENTA ", b"CHEXA_": b"CHEXA "},
+}  # fmt: skip
+_NAMES = {"abaqus": rb"(?<=TYPE=)\w+(?=\n)", "nastran": rb"(?m)^\w+"}
 _TURNED = ("vtk", "vtu")
 _WITH_SETS = ("abaqus", "exodus")
 # Which module's clock a writer asks for a remark: with that the same mesh would not have the same bytes.
@@ -67,7 +78,7 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
 def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
     """Write as much of a source, with other points (n, d), as the format takes; WriteError where that is nothing."""
     solved = {source.cells[i].type for i in solved_runs(source.cells)}
-    attempts = [(_KNOWN, source.arrays), (_COMMON, source.arrays), (solved, source.arrays), (solved, Arrays())]
+    attempts = [(_KNOWN, source.arrays), (_COMMON | solved, source.arrays), (solved, source.arrays), (solved, Arrays())]
     if form.name in formats.DRAWINGS and points.shape[1] == 2:
         points = np.column_stack([points, np.zeros(len(points))])
     for types, arrays in attempts:
@@ -86,9 +97,9 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
         raise WriteError(last)
     if len(list(path.parent.iterdir())) > 1:
         raise WriteError(f"cannot be written as {form.name}: it takes more than one file")
-    if form.name == "abaqus":
-        names = rb"(?<=TYPE=)\w+(?=\n)"
-        path.write_bytes(re.sub(names, lambda name: _PLAIN.get(name[0], name[0]), path.read_bytes()))
+    if form.name in _PLAIN:
+        plain = _PLAIN[form.name]
+        path.write_bytes(re.sub(_NAMES[form.name], lambda name: plain.get(name[0], name[0]), path.read_bytes()))
 
 
 @contextlib.contextmanager

@@ -37,6 +37,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "fixed": report.fixed,
         "valid": report.valid,
         "not_judged": dict(report.not_judged),
+        **({"higher_order": dict(report.higher_order)} if report.higher_order else {}),
         "misnumbered": report.misnumbered,
         "mirrored": int(mesh.topology.mirrored.sum()),
         **{name: _finite(getattr(result, name)) for name in NUMBERS},

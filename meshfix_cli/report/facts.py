@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, role, words
+from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, role, straight_key, words
 from meshfix_cli.mesh.mesh import ON_BOUNDARY, Mesh
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.quality.requirement import Requirement
@@ -61,6 +61,8 @@ class Report:
         Number of fixed vertices by reason.
     not_judged : dict
         Number of elements that are held and not judged, by the name of their type.
+    higher_order : dict
+        Number of elements that have more nodes than corners, by the name of their type.
     records : sequence of SweepRecord
     notes : sequence of str
     facts : dict
@@ -83,6 +85,7 @@ class Report:
     obstacles: Obstacles
     fixed: dict[str, int]
     not_judged: Mapping[str, int]
+    higher_order: Mapping[str, int] = field(default_factory=dict)
     records: Sequence[SweepRecord] = ()
     notes: Sequence[str] = ()
     facts: Mapping[str, Any] | None = None
@@ -210,15 +213,22 @@ def binned(mesh: Mesh) -> Binned:
 
 def title(report: Report) -> str:
     """Return what the mesh is, in one line."""
-    mesh, kinds = report.mesh, [(one.count, one.element) for one in report.result.kinds]
+    mesh = report.mesh
     held = ", ".join(f"{n:,} {why}" for why, n in report.fixed.items())
     vertices = counted(int(mesh.topology.used.sum()), "vertex", "vertices")
-    elements = [
-        counted(count, element.shape.name, element.shape.plural)
-        for count, element in kinds or [(mesh.topology.m, mesh.topology.element)]
-    ]
     free = f"{int(mesh.movable.sum()):,} free{_sliding(report)}"
-    return f"{report.name}: {', '.join([*elements, vertices])}: {free}{f', fixed {held}' if held else ''}"
+    return f"{report.name}: {', '.join([*_elements(report), vertices])}: {free}{f', fixed {held}' if held else ''}"
+
+
+def _elements(report: Report) -> Iterator[str]:
+    """Count the elements by their types, those of higher order by their own."""
+    kinds, topology = [(one.count, one.element) for one in report.result.kinds], report.mesh.topology
+    for count, element in kinds or [(topology.m, topology.element)]:
+        higher = [key for key in report.higher_order if element.key == straight_key(key)]
+        left = count - sum(report.higher_order[key] for key in higher)
+        if left:
+            yield counted(left, element.shape.name, element.shape.plural)
+        yield from (counted(report.higher_order[key], *words(key)) for key in higher)
 
 
 def _sliding(report: Report) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from isoparametric import REGULAR, regular
+from isoparametric import REGULAR, regular, shape_functions
 from programs import gmsh_session
 
 from meshfix_cli.mesh.elements import ELEMENTS, SIMPLICES, Element, dimension_of
@@ -12,6 +12,7 @@ from meshfix_cli.meshfile.gmsh.cells import ORDER
 
 linear = pytest.mark.parametrize("element", [ELEMENTS[key] for key in REGULAR], ids=list(REGULAR))
 KNOWN_TO_VTK = [element for element in ELEMENTS.values() if element.vtk is not None]
+HIGHER = [element for element in ELEMENTS.values() if element.between]
 KNOWN_TO_GMSH = [element for element in ELEMENTS.values() if element.gmsh is not None]
 
 
@@ -68,6 +69,45 @@ def test_vtk_knows_the_type_by_its_number(element: Element) -> None:
             ids = cell.GetFace(i).GetPointIds()
             expected.append([ids.GetId(k) for k in range(ids.GetNumberOfIds())])
         assert sorted(map(sorted, expected)) == sorted(map(sorted, element.shape.facets))
+
+
+@pytest.mark.parametrize("element", HIGHER, ids=[element.key for element in HIGHER])
+def test_nodes_lie_between_corners_where_vtk_and_gmsh_have_them(element: Element) -> None:
+    corners, weights = element.shape.corners, np.array(element.weights)
+    assert weights.shape == (element.nodes - corners, corners)
+    np.testing.assert_allclose(weights.sum(axis=1), 1)
+    if element.vtk is not None:
+        model = pytest.importorskip("vtkmodules.vtkCommonDataModel")
+        values = model.vtkGenericCell.InstantiateCell(element.vtk).GetParametricCoords()
+        places = np.array([values[i] for i in range(3 * element.nodes)]).reshape(-1, 3)
+        # The parameters of VTK's pyramids are those of a box whose top is the apex, or places in the pyramid.
+        known = shape_functions("pyramid", places[corners:]) if element.key == "pyramid13" else None
+        if known is None:
+            np.testing.assert_allclose(weights @ places[:corners], places[corners:], atol=1e-12)
+        else:
+            np.testing.assert_allclose(weights, known, atol=1e-12)
+    if element.gmsh is not None:
+        with gmsh_session() as gmsh:
+            parameters = gmsh.model.mesh.getElementProperties(element.gmsh)[4]
+        places = np.reshape(parameters, (element.nodes, -1))  # which have an order of their own
+        between, others = weights @ places[:corners], places[corners:]
+        apart = np.abs(between[:, None] - others).max(axis=2)
+        assert (apart < 1e-6).sum(axis=0).tolist() == (apart < 1e-6).sum(axis=1).tolist() == [1] * len(others)
+
+
+@pytest.mark.parametrize("element", HIGHER, ids=[element.key for element in HIGHER])
+def test_a_turned_element_has_all_nodes_between_the_same_corners(element: Element) -> None:
+    if element.shape.dimension < 2:
+        return
+    random = np.random.default_rng(3)
+    corners = random.random((element.shape.corners, 3))
+    nodes = np.concatenate([corners, np.array(element.weights) @ corners])
+    turned = nodes[list(element.mirrored)]
+    np.testing.assert_allclose(np.array(element.weights) @ turned[: len(corners)], turned[len(corners) :])
+    assert element.mirrored[: len(corners)] == element.shape.mirrored
+    assert sorted(element.mirrored) == list(range(element.nodes))
+    assert element.straight is not None
+    assert element.straight.nodes == len(corners)
 
 
 @pytest.mark.parametrize("element", KNOWN_TO_GMSH, ids=[element.key for element in KNOWN_TO_GMSH])

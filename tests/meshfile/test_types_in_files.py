@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import pytest
 from building import Blocks, Points
 from elements import MESHES
 from numpy.typing import NDArray
-from programs import gmsh_session
+from written import SOLIDS, TEXT_4, Made, by_gmsh, by_vtk, surface_by_vtk
 
 from meshfix_cli import read, write
 from meshfix_cli.errors import ReadError, WriteError
@@ -28,7 +27,6 @@ MIRRORED = {
     "tetra": [0, 2, 1, 3], "pyramid": [3, 2, 1, 0, 4], "wedge": [3, 4, 5, 0, 1, 2],
     "hexahedron": [4, 5, 6, 7, 0, 1, 2, 3],
 }  # fmt: skip
-Made = Callable[[Path, Points, Blocks], None]
 Corners = dict[str, NDArray[np.float64]]
 
 
@@ -39,75 +37,6 @@ def made(name: str) -> tuple[Points, Blocks]:
     return np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))]).round(5), cells
 
 
-def by_gmsh(path: Path, points: Points, cells: Blocks, options: dict[str, float] | None = None) -> None:
-    with gmsh_session(SaveAll=1, **options or {}) as gmsh:
-        dimension = ELEMENTS[cells[0][0]].shape.dimension
-        gmsh.model.addDiscreteEntity(dimension, 1)
-        gmsh.model.mesh.addNodes(dimension, 1, np.arange(len(points)) + 1, points.ravel())
-        for key, rows in cells:
-            gmsh.model.mesh.addElementsByType(1, ELEMENTS[key].gmsh, [], (rows + 1).ravel())
-        gmsh.write(str(path))
-
-
-def by_meshio(path: Path, points: Points, cells: Blocks) -> None:
-    """gmsh leaves prisms and pyramids out of MEDIT's files."""
-    meshio.Mesh(points, cells).write(path)
-
-
-def grid_of(points: Points, cells: Blocks) -> Any:
-    model = pytest.importorskip("vtkmodules.vtkCommonDataModel")
-    core = pytest.importorskip("vtkmodules.vtkCommonCore")
-    grid, places = model.vtkUnstructuredGrid(), core.vtkPoints()
-    places.SetDataType(11)
-    for point in points.tolist():
-        places.InsertNextPoint(point)
-    grid.SetPoints(places)
-    for key, rows in cells:
-        for row in rows.tolist():
-            grid.InsertNextCell(ELEMENTS[key].vtk, len(row), row)
-    return grid
-
-
-def by_vtk(path: Path, points: Points, cells: Blocks, binary: bool = False) -> None:
-    writer: Any
-    if path.suffix == ".vtu":
-        writer = pytest.importorskip("vtkmodules.vtkIOXML").vtkXMLUnstructuredGridWriter()
-        writer.SetDataMode(2 if binary else 0)
-    else:
-        writer = pytest.importorskip("vtkmodules.vtkIOLegacy").vtkUnstructuredGridWriter()
-        writer.SetFileType(2 if binary else 1)
-    writer.SetInputData(grid_of(points, cells))
-    writer.SetFileName(str(path))
-    assert writer.Write()
-
-
-def surface_by_vtk(path: Path, points: Points, cells: Blocks) -> None:
-    filters = pytest.importorskip("vtkmodules.vtkFiltersGeometry")
-    surface = filters.vtkGeometryFilter()
-    surface.SetInputData(grid_of(points, cells))
-    if path.suffix == ".obj":
-        writer = pytest.importorskip("vtkmodules.vtkIOGeometry").vtkOBJWriter()
-    else:
-        writer = pytest.importorskip("vtkmodules.vtkIOPLY").vtkPLYWriter()
-    writer.SetInputConnection(surface.GetOutputPort())
-    writer.SetFileName(str(path))
-    writer.Write()
-
-
-TEXT_2: dict[str, float] = {"MshFileVersion": 2.2, "Binary": 0}
-TEXT_4: dict[str, float] = {"MshFileVersion": 4.1, "Binary": 0}
-SOLIDS: dict[str, Made] = {
-    "text_2.msh": partial(by_gmsh, options=TEXT_2),
-    "binary_2.msh": partial(by_gmsh, options={**TEXT_2, "Binary": 1}),
-    "text_4.msh": partial(by_gmsh, options=TEXT_4),
-    "binary_4.msh": partial(by_gmsh, options={**TEXT_4, "Binary": 1}),
-    "gmsh.inp": by_gmsh,
-    "meshio.mesh": by_meshio,
-    "text.vtk": by_vtk,
-    "binary.vtk": partial(by_vtk, binary=True),
-    "text.vtu": by_vtk,
-    "binary.vtu": partial(by_vtk, binary=True),
-}
 PLATES: dict[str, Made] = {**SOLIDS, "gmsh.mesh": by_gmsh, "faces.obj": surface_by_vtk, "faces.ply": surface_by_vtk}
 
 
@@ -273,12 +202,13 @@ def test_facets_of_the_file_hold_their_vertices(tmp_path: Path) -> None:
     points, cells = made("every solid")
     by_vtk(tmp_path / "in.vtk", points, cells)
     free = np.flatnonzero(read(tmp_path / "in.vtk").mesh.movable)
-    facets: Blocks = [("quad", free[None, :4].astype(np.int32)), ("tetra10", free[None, 4:14].astype(np.int32))]
+    seven = free[[4, 5, 6, 6, 7, 8, 9, 10]]  # corners, of which no element is left
+    facets: Blocks = [("quad", free[None, :4].astype(np.int32)), ("hexahedron", seven[None].astype(np.int32))]
     by_vtk(tmp_path / "in.vtk", points, [*facets, *cells])
     document = read(tmp_path / "in.vtk")
-    assert not document.mesh.movable[free[:14]].any()
-    assert document.fixed["on other cells of the file"] == 14
-    assert document.not_judged == {"tetra10": 1}
+    assert not document.mesh.movable[free[:11]].any()
+    assert document.fixed["on other cells of the file"] == 11
+    assert document.not_judged == {"collapsed_hexahedron": 1}
     assert document.ids[0] == 2
 
 

@@ -24,6 +24,7 @@ Blocks = Sequence[tuple[Element, Places]]
 
 # By which share of the distance of its corners a node may lie off; of its element, where that is rounded to few digits.
 STRAIGHT, STRAIGHT_OF_FEW_DIGITS = 1e-6, 1e-2
+SAME = 1e-9  # by which weights may differ
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53  # rounding of numbers
 ROUNDINGS = 4.0  # of the file that a node may lie off: its own, those of its corners, and that of whoever put it there
 FEWEST_DIGITS, MOST_DIGITS = 5, 12  # of coordinates by which rounding is found out: of more than these it is none
@@ -210,7 +211,7 @@ class _Known:
         different = self._width[tie.nodes] != width
         rows = np.flatnonzero(~different)
         mine, other = tie.at(rows), self.groups[width].at(self._number[tie.nodes[rows]])
-        alike = (mine.corners == other.corners) & np.isclose(mine.weights, other.weights)
+        alike = (mine.corners == other.corners) & (np.abs(mine.weights - other.weights) < SAME)
         different[rows] = ~alike.all(axis=1)
         return different
 
@@ -222,13 +223,18 @@ def _between(element: Element, rows: Places) -> Iterator[tuple[Places, Tie]]:
     """
     for place, weights in enumerate(element.weights, element.shape.corners):
         chosen = np.flatnonzero(weights)
-        corners = rows[:, chosen]
-        order = np.argsort(corners, axis=1, kind="stable")
-        corners = np.take_along_axis(corners, order, axis=1)
-        tie = Tie(rows[:, place], corners, np.array(weights)[chosen][order])
-        repeated = (corners[:, 1:] == corners[:, :-1]).any(axis=1)
-        yield np.flatnonzero(~repeated), tie.at(~repeated)
-        yield from _collapsed(np.flatnonzero(repeated), tie.at(repeated))
+        corners, shares = rows[:, chosen], np.array(weights)[chosen]
+        if (shares == shares[0]).all():  # whatever the order
+            tie = Tie(rows[:, place], np.sort(corners, axis=1), np.broadcast_to(shares, corners.shape))
+        else:
+            order = np.argsort(corners, axis=1)
+            tie = Tie(rows[:, place], np.take_along_axis(corners, order, axis=1), shares[order])
+        repeated = (tie.corners[:, 1:] == tie.corners[:, :-1]).any(axis=1)
+        if repeated.any():
+            yield from _collapsed(np.flatnonzero(repeated), tie.at(repeated))
+            yield np.flatnonzero(~repeated), tie.at(~repeated)
+        else:
+            yield np.arange(len(rows)), tie
 
 
 def _collapsed(here: Places, tie: Tie) -> Iterator[tuple[Places, Tie]]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile.solved import solved_of, solved_runs
+from meshfix_cli.meshfile.solved import Part, solved_of, solved_runs
 from meshfix_cli.meshfile.source import Cells, ghost_vertices
 from meshfix_cli.meshfile.splice import Points
 
@@ -43,6 +43,14 @@ class Copies:
         mask = np.zeros(len(self.points), dtype=bool)
         for run in cells:
             mask[run.vertices] = True
+        return mask
+
+    def of_nodes(self, parts: Sequence[Part]) -> Mask:
+        """Mark the nodes (n,) of some elements that have more than corners."""
+        mask = np.zeros(len(self.points), dtype=bool)
+        for part in parts:
+            if part.nodes is not None:
+                mask[part.nodes] = True
         return mask
 
     def place(self, row: int) -> str:
@@ -147,7 +155,7 @@ def _on_interfaces(copies: Copies, threads: int) -> tuple[Mask, Mask]:
         # Where they are does not matter here, so a plane in space may be seen from any side.
         topology = Mesh.build(copies.points[:, : own.dimension], own.blocks, threads=threads).topology
         members |= topology.boundary
-        mine = topology.used
+        mine = topology.used | copies.of_nodes(own.parts)
     ghosts = ghost_vertices(elements, len(members))
     if ghosts is None:
         return members, np.zeros_like(members)

@@ -13,7 +13,9 @@ from files_vtu import TETRA, TRIANGLE
 from numpy.typing import NDArray
 from shapes import block
 
-KINDS = {3: TRIANGLE, 4: TETRA}
+from meshfix_cli.mesh.elements import ELEMENTS
+
+KINDS = {3: TRIANGLE, 4: TETRA, 10: ELEMENTS["tetra10"].vtk}
 
 
 def slabs(points: NDArray[Any], cells: NDArray[Any], count: int) -> NDArray[np.int64]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from building import Blocks, Points
 from elements import MESHES, box_of_hexahedra, collapsed, tangles
+from files_pvtu import slabs, split
 from geometries import GEOMETRIES
 from numpy.typing import NDArray
 from programs import TILTED
@@ -19,6 +20,7 @@ from splicing import WORD, repaired
 from written import SOLIDS, by_vtk
 
 from meshfix_cli import Mesh, read, untangle, write
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.document import Document
 
 FAMILIES = [
@@ -161,3 +163,77 @@ def repaired_as(path: Path, target: Path) -> tuple[Document, NDArray[np.floating
     after = untangle(document.mesh).after
     write(document, after, target)
     return document, document.file_points(after)
+
+
+@pytest.mark.parametrize("types", [SERENDIPITY, COMPLETE], ids=["serendipity", "complete"])
+@pytest.mark.parametrize("file", ["text.vtk", "binary.vtk", "text.vtu"])
+def test_elements_are_renumbered_with_all_their_nodes(file: str, types: dict[str, str], tmp_path: Path) -> None:
+    points, cells = refined(*made("every solid"), types)
+    turned = [(key, rows.copy()) for key, rows in cells]
+    for key, rows in turned:
+        rows[::5] = rows[::5][:, list(ELEMENTS[key].mirrored)]
+    SOLIDS[file](tmp_path / file, points, turned)
+    assert read(tmp_path / file).mesh.topology.misnumbered.sum() == sum(len(rows[::5]) for _, rows in cells)
+    document = read(tmp_path / file, fix_orientation=True)
+    assert not document.mesh.topology.flipped.any()
+    found = {run.type: run.vertices for run in document.source.cells}
+    assert all((found[key] == rows).all() for key, rows in cells)
+
+
+def test_collapsed_elements_are_solved_as_what_is_left_of_them(tmp_path: Path) -> None:
+    """Hexahedra of 20 nodes that are wedges, as Ansys has them: a node of a lost edge is that of its corners."""
+    points, cells = refined(*made("wedge plate"), SERENDIPITY)
+    wedges = cells[0][1]
+    corners, between = wedges[:, [0, 1, 2, 2, 3, 4, 5, 5]], wedges[:, 6:]
+    below, above = (between[:, [k, k + 1]] for k in (0, 3))
+    sides = between[:, [6, 7, 8, 8]]
+    lost = [wedges[:, [2]], wedges[:, [5]]]
+    middles_of = [below, lost[0], between[:, [2]], above, lost[1], between[:, [5]], sides]
+    box = np.column_stack([corners, *middles_of]).astype(np.int32)
+    by_vtk(tmp_path / "in.vtk", points, [("hexahedron20", box)])
+    document = read(tmp_path / "in.vtk")
+    assert {part.key for part in document.parts} == {"wedge"}
+    assert document.higher_order == {}
+    assert document.ties is not None
+    assert document.ties.nodes.sum() == len(middles(cells))
+    by_vtk(tmp_path / "in.vtk", refined(tangled("wedge plate", "P=25 D=2h"), made("wedge plate")[1], SERENDIPITY)[0],
+           [("hexahedron20", box)])  # fmt: skip
+    _, after = repaired(tmp_path / "in.vtk", tmp_path / "out.vtk")
+    assert_in_the_middle(after, cells, read(tmp_path / "in.vtk").source.points)
+    assert read(tmp_path / "out.vtk").mesh.topology.m == len(wedges)
+
+
+def test_points_that_are_joined_take_the_nodes_of_all_elements_along(tmp_path: Path) -> None:
+    """Two halves that share no node: corners at one place are joined, nodes between them follow each for itself."""
+    linear, tets = tangled("block", "P=25 D=2h"), made("block")[1][0][1]
+    half = linear[tets].mean(axis=1)[:, 0] < np.median(linear[tets].mean(axis=1)[:, 0])
+    parts = []
+    for chosen in (half, ~half):
+        used, rows = np.unique(tets[chosen], return_inverse=True)
+        parts.append(refined(linear[used], [("tetra", rows.reshape(-1, 4).astype(np.int32))], SERENDIPITY))
+    (one, cells), (other, more) = parts
+    both = [("tetra10", cells[0][1]), ("tetra10", more[0][1] + len(one))]
+    by_vtk(tmp_path / "in.vtk", np.concatenate([one, other]), both)
+    document, points = repaired(tmp_path / "in.vtk", tmp_path / "out.vtk", join_points=True)
+    by_vtk(tmp_path / "whole.vtk", *refined(linear, [("tetra", tets)], SERENDIPITY))
+    assert document.mesh.movable.sum() == read(tmp_path / "whole.vtk").mesh.movable.sum()
+    assert_in_the_middle(points, both, document.source.points)
+
+
+@pytest.mark.parametrize("ghosts", [False, True])
+@pytest.mark.parametrize("ids", [False, True])
+def test_pieces_of_a_mesh_agree_about_nodes_between_corners(ids: bool, ghosts: bool, tmp_path: Path) -> None:
+    points, cells = refined(tangled("block", "P=25 D=2h"), made("block")[1], SERENDIPITY)
+    rows = cells[0][1].astype(np.int64)
+    split(tmp_path / "in.pvtu", points, rows, slabs(points, rows, 3), ids=ids, ghosts=ghosts)
+    by_vtk(tmp_path / "whole.vtk", points, cells)
+    document, _ = repaired(tmp_path / "in.pvtu", tmp_path / "out.pvtu")
+    assert document.higher_order == {"tetra10": len(rows)}
+    assert document.mesh.movable.sum() == read(tmp_path / "whole.vtk").mesh.movable.sum()
+    found = {}
+    for i in range(3):
+        before, after = (meshio.read(tmp_path / f"{name}_{i}.vtu") for name in ("in", "out"))
+        places = list(map(tuple, before.points.tolist()))
+        for place, point in zip(places, after.points.tolist(), strict=True):
+            assert found.setdefault(place, point) == point
+    assert read(tmp_path / "out.pvtu").mesh.check()[0] == 0

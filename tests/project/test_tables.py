@@ -87,11 +87,11 @@ def test_moves() -> None:
 
 
 def test_elements() -> None:
-    rows = re.findall(r"^\| (\w[^|]*) \| `(\w+)` \| (\w+) \| (\d*) \| (\d*) \| (solved|held) \|$",
+    rows = re.findall(r"^\| (\w[^|]*) \| `(\w+)` \| (\w+) \| (\d*) \| (\d*) \| (solved|by its corners|held) \|$",
                       (DOCS / "elements.md").read_text(), re.MULTILINE)  # fmt: skip
     expected = [
         (one.shape.name, key, str(one.nodes or "any"), str(one.vtk or ""), str(one.gmsh or ""),
-         "solved" if one.judged_by else "held")
+         "solved" if one.judged_by else "by its corners" if one.straight else "held")
         for key, one in ELEMENTS.items()
     ]  # fmt: skip
     assert rows == expected

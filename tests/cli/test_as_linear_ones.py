@@ -22,7 +22,7 @@ from meshfix_cli.meshfile.document import HALFWAY
 EVERY = {**SERENDIPITY, "line": "line3"}
 POINTS, TETRA = grid(*[np.linspace(0, 1, 5)] * 3)
 CORNERS = len(POINTS)
-INSIDE = ((POINTS > 0) & (POINTS < 1)).all(axis=1)
+INSIDE = np.asarray(((POINTS > 0) & (POINTS < 1)).all(axis=1))
 # Triangles on one side, and an edge in it.
 SIDE = np.array([face for row in TETRA for face in (np.delete(row, k) for k in range(4)) if not POINTS[face, 2].any()])
 LINE = np.flatnonzero((POINTS[:, 2] == 0) & (POINTS[:, 1] == 0.5))
@@ -44,7 +44,7 @@ def boxes(folder: Path, tangle: bool = True, suffix: str = ".vtu") -> tuple[Path
 
 def halfway(cells: Any) -> tuple[int, NDArray[np.integer]]:
     """A node between two inner corners, and these."""
-    return next((node, corners) for node, (corners, _) in middles(cells).items() if INSIDE[corners].all())
+    return next((node, corners) for node, (corners, _) in middles(cells).items() if np.all(INSIDE[corners]))
 
 
 def points_of(path: Path) -> NDArray[np.float64]:

@@ -230,7 +230,7 @@ def test_pieces_of_a_mesh_agree_about_nodes_between_corners(ids: bool, ghosts: b
     document, _ = repaired(tmp_path / "in.pvtu", tmp_path / "out.pvtu")
     assert document.higher_order == {"tetra10": len(rows)}
     assert document.mesh.movable.sum() == read(tmp_path / "whole.vtk").mesh.movable.sum()
-    found = {}
+    found: dict[tuple[float, ...], list[float]] = {}
     for i in range(3):
         before, after = (meshio.read(tmp_path / f"{name}_{i}.vtu") for name in ("in", "out"))
         places = list(map(tuple, before.points.tolist()))

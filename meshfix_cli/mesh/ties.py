@@ -26,8 +26,8 @@ Blocks = Sequence[tuple[Element, Places]]
 STRAIGHT, STRAIGHT_OF_FEW_DIGITS = 1e-6, 1e-2
 SAME = 1e-9  # by which weights may differ
 SINGLE, DOUBLE = 2.0**-24, 2.0**-53  # rounding of numbers
-ROUNDINGS = 4.0  # of the file that a node may lie off: its own, those of its corners, and that of whoever put it there
-FEWEST_DIGITS, MOST_DIGITS = 5, 12  # of coordinates by which rounding is found out: of more than these it is none
+ROUNDINGS = 3.0  # of the file that a node may lie off: its own, that of its corners, and that of whoever put it there
+FEWEST_DIGITS, MOST_DIGITS = 6, 12  # of coordinates by which rounding is found out: of more than these it is none
 
 
 @dataclass(frozen=True, eq=False)

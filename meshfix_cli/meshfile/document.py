@@ -388,7 +388,7 @@ def _flat(points: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np
 
 
 def _on_other_cells(solved: Solved, n: int) -> NDArray[np.bool_]:
-    """Vertices of cells that are not solved for: lines, facets on the boundary, elements of second order, ..."""
+    """Vertices of cells that are not solved for: lines, facets on the boundary, polyhedra, ..."""
     mask = np.zeros(n, dtype=bool)
     for run in solved.rest:
         for row in [run.vertices] if isinstance(run.vertices, np.ndarray) else run.vertices:

@@ -37,7 +37,7 @@ def read(
     form: str | None = None,
     threads: int = 1,
 ) -> Document:
-    """Read a mesh of linear elements, all solid or all in a plane.
+    """Read a mesh of linear elements, or of straight ones of higher order, all solid or all in a plane.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def read(
     Raises
     ------
     ReadError
-        The file cannot be read, holds no mesh of linear elements, or not the arrays named.
+        The file cannot be read, holds no mesh of such elements, or a curved one, or not the arrays named.
     InvalidMeshError
         See `Mesh.build`.
     """

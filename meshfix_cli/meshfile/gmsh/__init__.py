@@ -72,7 +72,7 @@ def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
         Cells(TYPES[block.kind][0], _vertices(block, find), block.ids, file.ghosts(block)) for block in file.blocks
     ]
     by_corner = "section $ElementNodeData" in file.untold
-    layout = InPlace(data, coordinates, [_refuse if by_corner else block.corners for block in file.blocks])
+    layout = InPlace(data, coordinates, [_refuse if by_corner else partial(_corners, block) for block in file.blocks])
     load, regions = partial(_load, file, tags, cells, labels), _regions(file, cells, labels)
     for what, numbers in (("nodes", tags), ("elements", _ids(cells))):
         if not np.array_equal(numbers, np.arange(1, len(numbers) + 1)):
@@ -113,6 +113,11 @@ def _vertices(block: Block, find: Callable[[Int64], Int64]) -> Int64:
         raise ReadError(f"the element {element} has the node {block.nodes[missing][0]}, which is not in $Nodes")
     order = ORDER.get(TYPES[block.kind][0])
     return rows if order is None else rows[:, order]
+
+
+def _corners(block: Block) -> Places:
+    order = ORDER.get(TYPES[block.kind][0])
+    return block.corners() if order is None else block.corners().at((slice(None), order))
 
 
 def _joined(places: Sequence[Places]) -> Places:

@@ -39,12 +39,15 @@ TYPES = {
     for family, sizes in _HIGHER.items()
     for kind, size in sizes.items()
 } | {element.gmsh: (key, element.nodes) for key, element in ELEMENTS.items() if element.gmsh is not None}
-# Where meshio, which follows VTK, has another order: which of gmsh's nodes stands there.
-_EDGES = [8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]  # of a hexahedron
+# Where the table of elements, which follows VTK, has another order: which of gmsh's nodes stands there.
+_ON_HEXAHEDRON = [8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
+_ON_WEDGE, _ON_PYRAMID = [6, 9, 7, 12, 14, 13, 8, 10, 11], [5, 8, 10, 6, 7, 9, 11, 12]
 ORDER = {
     "tetra10": [*range(8), 9, 8],
-    "hexahedron20": [*range(8), *_EDGES],
-    "hexahedron27": [*range(8), *_EDGES, 22, 23, 21, 24, 20, 25, 26],
-    "wedge15": [*range(6), 6, 9, 7, 12, 14, 13, 8, 10, 11],
-    "pyramid13": [*range(5), 5, 8, 10, 6, 7, 9, 11, 12],
+    "hexahedron20": [*range(8), *_ON_HEXAHEDRON],
+    "hexahedron27": [*range(8), *_ON_HEXAHEDRON, 22, 23, 21, 24, 20, 25, 26],
+    "wedge15": [*range(6), *_ON_WEDGE],
+    "wedge18": [*range(6), *_ON_WEDGE, 15, 17, 16],
+    "pyramid13": [*range(5), *_ON_PYRAMID],
+    "pyramid14": [*range(5), *_ON_PYRAMID, 13],
 }

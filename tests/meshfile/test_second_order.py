@@ -1,0 +1,105 @@
+"""Nodes of elements of second order come in VTK's order, whoever has written the file, and can be turned there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from programs import gmsh_session
+from second_order import BETWEEN, element, is_straight
+
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.meshfile import formats, reading
+from meshfix_cli.meshfile.source import Source
+from meshfix_cli.meshfile.splice import Turned
+
+
+def source_of(path: Path) -> Source:
+    """What a file holds."""
+    data = path.read_bytes()
+    form = formats.sniff(data) or formats.by_name(path)
+    assert form is not None
+    return reading.parse(data, form, path)
+
+
+def gmsh_writes(path: Path, key: str, **options: float) -> None:
+    """Let gmsh write an element whose nodes it makes, straight, of those of the linear one."""
+    nodes, shape = element(key), ELEMENTS[key].shape
+    linear = next(one for one in ELEMENTS.values() if one.shape is shape and one.linear)
+    incomplete = key in ("quad8", "pyramid13", "wedge15", "hexahedron20")
+    with gmsh_session(SaveAll=1, SecondOrderIncomplete=incomplete, **options) as gmsh:
+        gmsh.model.addDiscreteEntity(shape.dimension, 1)
+        numbers = np.arange(shape.corners) + 1
+        gmsh.model.mesh.addNodes(shape.dimension, 1, numbers, nodes[: shape.corners].ravel())
+        gmsh.model.mesh.addElementsByType(1, linear.gmsh, [], numbers)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.write(str(path))
+
+
+LINES, PLANES, SOLIDS = ["line3"], ["triangle6", "quad8"], ["tetra10", "wedge15", "hexahedron20"]
+FULL = [key for key in BETWEEN if key not in ("pyramid13", "pyramid14")]
+# What gmsh writes as its programs have it: the ending, its options, and the types.
+BY_GMSH: dict[str, tuple[str, dict[str, float], Iterable[str]]] = {
+    "1": ("msh", {"MshFileVersion": 1}, BETWEEN),
+    "2.2": ("msh", {"MshFileVersion": 2.2}, BETWEEN),
+    "2.2 binary": ("msh", {"MshFileVersion": 2.2, "Binary": 1}, BETWEEN),
+    "4.1": ("msh", {"MshFileVersion": 4.1}, BETWEEN),
+    "4.1 binary": ("msh", {"MshFileVersion": 4.1, "Binary": 1}, BETWEEN),
+    "vtk": ("vtk", {}, FULL),
+    "med": ("med", {}, [*FULL, "pyramid13"]),
+    "unv": ("unv", {}, [*LINES, *PLANES, *SOLIDS]),
+    "inp": ("inp", {}, [*PLANES, *SOLIDS]),
+    "bdf free": ("bdf", {"BdfFieldFormat": 0}, [*PLANES, *SOLIDS]),
+    "bdf": ("bdf", {"BdfFieldFormat": 1}, [*PLANES, *SOLIDS]),
+    "bdf wide": ("bdf", {"BdfFieldFormat": 2}, [*PLANES, *SOLIDS]),
+    "mesh": ("mesh", {}, [*LINES, "triangle6", "tetra10"]),
+    "cgns": ("cgns", {}, [*FULL, "pyramid14"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "key"), [(name, key) for name, (_, _, keys) in BY_GMSH.items() for key in keys])
+def test_gmsh_writes_elements_whose_nodes_come_in_the_order_of_vtk(name: str, key: str, tmp_path: Path) -> None:
+    ending, options, _ = BY_GMSH[name]
+    gmsh_writes(path := tmp_path / f"one.{ending}", key, **options)
+    check(path, key, 1e-3 if ending == "bdf" else 1e-6)
+
+
+@pytest.mark.parametrize("key", [key for key in BETWEEN if ELEMENTS[key].vtk])
+@pytest.mark.parametrize("name", ["vtk", "vtk binary", "vtu", "vtu ascii"])
+def test_vtk_writes_elements_whose_nodes_come_in_its_order(name: str, key: str, tmp_path: Path) -> None:
+    pytest.importorskip("vtk")
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkPoints
+    from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
+
+    grid, points, nodes = vtkUnstructuredGrid(), vtkPoints(), element(key)
+    points.SetData(numpy_to_vtk(nodes, deep=True))
+    grid.SetPoints(points)
+    kind = ELEMENTS[key].vtk
+    assert kind is not None
+    grid.InsertNextCell(kind, len(nodes), list(range(len(nodes))))
+    module, prefix = {"vtk": ("Legacy", ""), "vtu": ("XML", "XML")}[name[:3]]
+    writer = getattr(pytest.importorskip(f"vtkmodules.vtkIO{module}"), f"vtk{prefix}UnstructuredGridWriter")()
+    if name == "vtk binary":
+        writer.SetFileTypeToBinary()
+    if name == "vtu ascii":
+        writer.SetDataModeToAscii()
+    writer.SetFileName(str(path := tmp_path / f"one.{name[:3]}"))
+    writer.SetInputData(grid)
+    writer.Write()
+    check(path, key)
+
+
+def check(path: Path, key: str, tolerance: float = 1e-6) -> None:
+    """The one element has nodes where VTK has them, and the file, turned, has them where its own order has them."""
+    source = source_of(path)
+    (run,) = (run for run in source.cells if run.type == key)
+    at = next(i for i, one in enumerate(source.cells) if one is run)
+    assert is_straight(key, source.points[run.vertices], tolerance)
+    assert source.layout is not None
+    order = np.random.default_rng(5).permutation(ELEMENTS[key].nodes)
+    turned = source.layout.rewritten(source.points, source.points, {at: Turned(np.array([0]), order.tolist())})
+    path.write_bytes(turned)
+    np.testing.assert_array_equal(source_of(path).cells[at].vertices, run.vertices[:, order])

@@ -320,7 +320,7 @@ OWN = {
     ),
     "mfem": Own(
         "mfem", _mfem, {".mesh": "mfem"}, "MFEM",
-        "versions 1.0, 1.2 and 1.3, also with nodes of first order; no NURBS, nonconforming or curved meshes",
+        "versions 1.0, 1.2 and 1.3, also with nodes of first or second order; no NURBS or nonconforming meshes",
         "attributes; their sets, and those of the boundary",
     ),
     "mdpa": Own(

@@ -11,6 +11,8 @@ import shapes
 from files_medit import surface
 from numpy.typing import NDArray
 
+from meshfix_cli.mesh.elements import ELEMENTS
+
 TYPES = {2: 1, 3: 2, 4: 4}  # of MFEM, by the number of vertices of a simplex
 CORNERS = [1, 2, 3, 4, 4, 8, 6, 5]  # of each type
 HEAD = "\n#\n# MFEM Geometry Types (see fem/geom.hpp):\n#\n# POINT       = 0\n# SEGMENT     = 1\n#\n\n"
@@ -49,6 +51,48 @@ def nodes(points: NDArray[np.float64], order: int, collection: str) -> str:
     return (
         f"\nnodes\nFiniteElementSpace\nFiniteElementCollection: {collection}\nVDim: {d}\nOrdering: {order}\n\n{values}"
     )
+
+
+NUMBERS = {"line": 1, "triangle": 2, "quad": 3, "tetra": 4, "hexahedron": 5, "wedge": 6, "pyramid": 7}
+# By hand from the list of geometries: the edges of each, and the faces that are squares.
+EDGES = {
+    "line": "01", "triangle": "01 12 20", "quad": "01 12 23 30", "tetra": "01 02 03 12 13 23",
+    "hexahedron": "01 12 32 03 45 56 76 47 04 15 26 37", "wedge": "01 12 20 34 45 53 03 14 25",
+}  # fmt: skip
+SQUARES = {"quad": "0123", "hexahedron": "3210 0154 1265 2376 3047 4567", "wedge": "0143 1254 2035"}
+
+
+def of_second_order(
+    points: NDArray[np.float64], blocks: Sequence[tuple[str, NDArray[Any]]], order: int, collection: str
+) -> str:
+    """A mesh whose nodes of second order lie in the middle, counted one by one as MFEM counts them."""
+    cells = [(key, row) for key, rows in blocks for row in rows.tolist()]
+    d, middles = points.shape[1], [*points]
+    met: set[frozenset[int]] = set()
+    for some in (EDGES, SQUARES):
+        for key, row in cells:
+            for word in some.get(key, "").split() if key != "quad" or some is EDGES else ():
+                corners = [row[int(one)] for one in word]
+                if frozenset(corners) not in met:
+                    met.add(frozenset(corners))
+                    middles.append(points[corners].mean(axis=0))
+    middles += [points[row].mean(axis=0) for key, row in cells if key in ("quad", "hexahedron")]
+    skin = facets(cells)
+    listed = ["".join(f"1 {NUMBERS[key]} {' '.join(map(str, row))}\n" for key, row in some) for some in (cells, skin)]
+    return (
+        f"MFEM mesh v1.0\n{HEAD}dimension\n{d}\n\nelements\n{len(cells)}\n{listed[0]}\n"
+        f"boundary\n{len(skin)}\n{listed[1]}\nvertices\n{len(points)}\n{nodes(np.array(middles), order, collection)}"
+    )
+
+
+def facets(cells: Sequence[tuple[str, list[int]]]) -> list[tuple[str, list[int]]]:
+    """The facets that one element has alone."""
+    found: dict[frozenset[int], list[list[int]]] = {}
+    for key, row in cells:
+        for facet in ELEMENTS[key].shape.facets:
+            found.setdefault(frozenset(row[i] for i in facet), []).append([row[i] for i in facet])
+    kinds = {2: "line", 3: "triangle", 4: "quad"}
+    return [(kinds[len(rows[0])], rows[0]) for rows in found.values() if len(rows) == 1]
 
 
 def plane(path: Path) -> None:

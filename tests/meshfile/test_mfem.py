@@ -8,13 +8,16 @@ import numpy as np
 import pytest
 from elements import MESHES
 from files_medit import surface
-from files_mfem import CORNERS, FILES, nodes, text
+from files_mfem import CORNERS, FILES, NUMBERS, nodes, of_second_order, text
+from second_order import is_straight
 from shapes import block, plate
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.mfem import parse
+from meshfix_cli.meshfile.solved import turned
 
 SMALL = b"""MFEM mesh v1.3
 
@@ -50,7 +53,6 @@ vertices
 0 2
 0.5 1
 """
-NUMBERS = {"triangle": 2, "quad": 3, "tetra": 4, "hexahedron": 5, "wedge": 6, "pyramid": 7}
 # The corners of each reference element, by hand from MFEM's list of its geometries.
 REFERENCE = {
     "quad": [[0, 0], [1, 0], [1, 1], [0, 1]],
@@ -122,6 +124,39 @@ def test_nodes_of_first_order_are_the_coordinates(order: int, collection: str) -
     np.testing.assert_array_equal(source.cells[0].vertices, cells)
 
 
+@pytest.mark.parametrize("name", ["quads and triangles", "hexes and wedges", "wedges and tets"])
+@pytest.mark.parametrize(("order", "collection"), [(0, "H1_3D_P2"), (1, "Quadratic"), (1, "H1@U_2D_P2")])
+def test_nodes_of_second_order_are_those_of_the_elements(name: str, order: int, collection: str) -> None:
+    points, blocks = MESHES[name]()
+    source = parse(of_second_order(points, blocks, order, collection).encode())
+    linear = {(key, tuple(row)) for key, rows in blocks for row in rows.tolist()}
+    found = set()
+    for run in source.cells:
+        assert is_straight(run.type, source.points[run.vertices], 2e-6)
+        if run.ids is not None:
+            key = run.type.rstrip("0123456789")
+            found |= {(key, tuple(row)) for row in run.vertices[:, : ELEMENTS[key].nodes].tolist()}
+    assert found == linear
+    assert len(np.unique(np.concatenate([run.vertices.ravel() for run in source.cells]))) == len(source.points)
+
+
+def test_nodes_of_second_order_that_cannot_be_told() -> None:
+    square = of_second_order(
+        np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), [("quad", np.arange(4)[None])], 1, "Quadratic"
+    )
+    source = parse(square.encode())
+    assert source.cells[0].vertices.tolist() == [[*range(9)]]
+    with pytest.raises(ReadError, match="has nodes of order 2, which are told apart by the order of its elements"):
+        source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([0])}))  # type: ignore[union-attr]
+    with pytest.raises(ReadError, match="a facet on its boundary that is none of an element"):
+        parse(square.replace("1 1 0 1\n", "1 1 0 2\n").encode())
+    pyramid = of_second_order(np.eye(5, 3), [("tetra", np.arange(4)[None])], 1, "Quadratic").replace(
+        "1 4 0 1 2 3", "1 7 0 1 2 3 4"
+    )
+    with pytest.raises(ReadError, match="has pyramids with nodes of order 2"):
+        parse(pyramid.encode())
+
+
 @pytest.mark.parametrize("order", [0, 1])
 def test_elements_with_nodes_of_their_own_are_solved_as_one_mesh_where_points_are_joined(
     order: int, tmp_path: Path
@@ -176,7 +211,11 @@ def test_the_boundary_of_elements_with_nodes_of_their_own_is_held() -> None:
         (SMALL.replace(b"v1.3", b"v1.4"), "is of MFEM's version 1.4"),
         (SMALL + b"\nvertex_parents\n0\n", r"is a nonconforming mesh \(NC\)"),
         (text(*block(), nodes(block()[0], 1, "H1_3D_P3")).encode(), r"has curved elements \(nodes of order 3\)"),
-        (text(*block(), nodes(block()[0], 1, "Quadratic")).encode(), r"has curved elements \(nodes of order 2\)"),
+        (
+            text(*block(), nodes(block()[0], 1, "Quadratic")).encode(),
+            "numbers are announced, and the file is truncated",
+        ),
+        (text(*block(), nodes(block()[0], 1, "H1Pos_3D_P2")).encode(), "has nodes in the space H1Pos_3D_P2"),
         (text(*block(), nodes(block()[0], 1, "L2_T4_3D_P4")).encode(), r"has curved elements \(nodes of order 4\)"),
         (text(*block(), nodes(block()[0], 1, "L2_3D_P1")).encode(), "has nodes in the space L2_3D_P1"),
         (text(*block(), nodes(block()[0][:-1], 1, "H1_3D_P1")).encode(), "is truncated"),
@@ -232,4 +271,4 @@ def test_truncated(name: str, tmp_path: Path) -> None:
 
 def test_corners_of_all_types() -> None:
     """The table of the tests' own reader is that of MFEM's numbers."""
-    assert [len(REFERENCE[key]) for key in NUMBERS] == CORNERS[2:]
+    assert [len(REFERENCE[key]) for key in NUMBERS if key != "line"] == CORNERS[2:]

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.meshfile.mfem.nodes import Linear, second_order
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import Int64, IntegerLines, Numbering, Runs, alike, integer_lines, rows, without
@@ -29,6 +30,7 @@ _SET = re.compile(rb'\s*"([^"\n]*)"')
 _SPACE = re.compile(
     rb"\s*FiniteElementSpace\s+FiniteElementCollection:\s*(\S+)\s+VDim:\s*([1-3])\s+Ordering:\s*([01])(?!\S)"
 )
+_SECOND = re.compile(r"Quadratic|H1(?:@[GU])?_\dD_P2")  # in which a node is where its value says
 _ORDERS = {"Linear": 1, "Quadratic": 2, "Cubic": 3}
 _KINDS = {"NURBS": "a NURBS mesh", "NC": "a nonconforming mesh (NC)", "INLINE": "a mesh that is to be made (INLINE)"}
 _TYPES = {
@@ -56,6 +58,8 @@ class _Mesh:
         Spans of the coordinates.
     apart : bool
         Each element has points of its own, as in periodic meshes.
+    second : list of (str, int64)
+        The types and the nodes (m, k) of elements and boundary where these are of second order.
     end : int
     """
 
@@ -64,22 +68,20 @@ class _Mesh:
     n: int = 0
     points: Spans | None = None
     apart: bool = False
+    second: list[tuple[str, Int64]] = field(default_factory=list)
     end: int = 0
 
 
 def parse(data: bytes) -> Source:
-    """Read vertices, elements and boundary; nodes only where they are of first order."""
+    """Read vertices, elements and boundary; nodes only where they are of first order, or of second and shared."""
     text = without(data, _COMMENT, b"#")
     mesh = _sections(text)
     if mesh.points is None or "elements" not in mesh.tables:
         raise ReadError("is truncated: it has no vertices, or no elements")
     coordinates, runs = Places.of_text(mesh.points), Runs()
-    if mesh.apart:
-        held = _add_apart(runs, mesh)
-    else:
-        held = None
-        for section in ("elements", "boundary"):
-            _add(runs, mesh, section)
+    held = _add_apart(runs, mesh) if mesh.apart else None
+    if not mesh.apart:
+        _add(runs, mesh)
     untold = ("comments",) * (text is not data) + ("what stands behind its end",) * bool(text[mesh.end :].strip())
     return Source(
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners), runs.arrays, (_ATTRIBUTE,), held,
@@ -153,12 +155,14 @@ def _read_nodes(mesh: _Mesh, text: bytes, at: int) -> int:
     name = space[1].decode("latin-1")
     found = re.search(r"_P(\d{1,3})$", name)
     order = int(found[1]) if found else _ORDERS.get(name, 1)
-    if order > 1:
+    if order > 2:
         raise ReadError(f"has curved elements (nodes of order {order}), which are not read yet")
     mesh.apart = re.fullmatch(r"L2_T1_\dD_P1", name) is not None
-    if not (mesh.apart or name == "Linear" or re.fullmatch(r"H1\w*?(?:@.)?_\dD_P1", name)):
+    if not (mesh.apart or name == "Linear" or re.fullmatch(r"H1\w*?(?:@.)?_\dD_P1", name) or _SECOND.fullmatch(name)):
         raise ReadError(f"has nodes in the space {name}, which are not read")
     n, d = (int(_sizes(mesh)[0].sum()) if mesh.apart else mesh.n), int(space[2])
+    if order == 2:
+        mesh.second, n = second_order(mesh.n, _linear(mesh, "elements"), _linear(mesh, "boundary"))
     by_component = space[3] == b"0"
     spans, at = rows(text, space.end(), d if by_component else n, n if by_component else d)
     mesh.points = spans.transpose(1, 0, 2) if by_component else spans
@@ -193,17 +197,26 @@ def _types(table: IntegerLines) -> Int64:
     return types
 
 
-def _add(runs: Runs, mesh: _Mesh, section: str) -> None:
-    """Add the elements, or the facets of the boundary."""
+def _add(runs: Runs, mesh: _Mesh) -> None:
+    """Add the elements and the facets of the boundary, with their nodes of second order where there are some."""
+    cells = [(section, one) for section in ("elements", "boundary") for one in _linear(mesh, section)]
+    of_mesh = iter(mesh.second or [(one.key, one.vertices) for _, one in cells])
+    for section, one in cells:
+        key, nodes = next(of_mesh)
+        corners = _refuse_second if mesh.second else partial(_corners, mesh.tables[section], nodes.shape[1], one.rows)
+        _put(runs, Cells(key, nodes, one.rows if section == "elements" else None), corners, mesh, section, one.rows)
+
+
+def _linear(mesh: _Mesh, section: str) -> list[Linear]:
+    """Return the elements, or the facets of the boundary, by their vertices."""
     if section not in mesh.tables:
-        return
+        return []
     table, vertices_of = mesh.tables[section], Numbering(np.arange(mesh.n)).points_of
-    types, of_mesh = _types(table), section == "elements"
+    types, found = _types(table), []
     for here in alike(types):
         key, size = _TYPES[int(types[here[0]])]
-        vertices = vertices_of(table.integers(2, 2 + size, here), here)
-        cells = Cells(key, vertices, here if of_mesh else None)
-        _put(runs, cells, partial(_corners, table, size, here), mesh, section, here)
+        found.append(Linear(key, vertices_of(table.integers(2, 2 + size, here), here), here))
+    return found
 
 
 def _put(runs: Runs, cells: Cells, corners: Callable[[], Places], mesh: _Mesh, section: str, here: Int64) -> None:
@@ -244,6 +257,10 @@ def _on_boundary(mesh: _Mesh) -> Int64:
 
 def _refuse() -> Places:
     raise ReadError("has nodes of its own for each element, which would be those of others if it were renumbered")
+
+
+def _refuse_second() -> Places:
+    raise ReadError("has nodes of order 2, which are told apart by the order of its elements and of their vertices")
 
 
 def _corners(table: IntegerLines, size: int, here: Int64) -> Places:

@@ -1,9 +1,11 @@
 """Comsol's .mphtxt files: objects, of which one is a mesh and others select parts of it; comments stand behind #.
 
 A mesh has points, each as many coordinates as the space has dimensions, and for each type of elements their points, and
-the number of the entity of the geometry that each lies in. Points of quadrilaterals and hexahedra run along the axes.
+the number of the entity of the geometry that each lies in. Points of quadrilaterals and hexahedra run along the axes,
+and so do, behind the corners, the other points of elements of second order.
 
-Source: Comsol, "Reference Manual", chapter "The COMSOL File Formats", sections "Mesh" and "Selection".
+Source: Comsol, "Reference Manual", chapter "The COMSOL File Formats", sections "Mesh" and "Selection"; for the second
+order FEconv, "module_utils_mphtxt.f90".
 """
 
 from __future__ import annotations
@@ -26,7 +28,15 @@ _TYPES = {
     "vtx": "vertex", "edg": "line", "tri": "triangle", "quad": "quad", "tet": "tetra", "pyr": "pyramid",
     "prism": "wedge", "hex": "hexahedron",
 }  # fmt: skip
-_ORDER = {"quad": [0, 1, 3, 2], "pyramid": [0, 1, 3, 2, 4], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
+# Which of the points stands in each place of the table of elements; of the second order, all types that are known.
+_ORDER = {
+    "quad": [0, 1, 3, 2], "pyramid": [0, 1, 3, 2, 4], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6],
+    "line3": [0, 1, 2], "triangle6": [0, 1, 2, 3, 5, 4], "quad9": [0, 1, 3, 2, 4, 7, 8, 5, 6],
+    "tetra10": [0, 1, 2, 3, 4, 6, 5, 7, 8, 9],
+    "hexahedron27": [
+        0, 1, 3, 2, 4, 5, 7, 6, 8, 11, 12, 9, 22, 25, 26, 23, 13, 15, 21, 19, 16, 18, 14, 20, 10, 24, 17,
+    ],
+}  # fmt: skip
 _ENTITY = "comsol:entity"
 _MOST = 64  # points of an element
 _NEWER = 4  # versions of a mesh from which on elements have neither parameters nor the domains on both sides
@@ -113,7 +123,8 @@ def _mesh(file: _Reader, runs: Runs) -> Spans:
         shape = _TYPES.get(name.rstrip("2"), "")
         if not shape or not ELEMENTS[shape].nodes <= size <= _MOST:
             raise in_line(file.text, file.at, f"elements of the type {name!r} with {size} points are not known")
-        key = shape if size == ELEMENTS[shape].nodes else f"{shape}_of_{size}"
+        second = f"{shape}{size}"
+        key = shape if size == ELEMENTS[shape].nodes else second if second in _ORDER else f"{shape}_of_{size}"
         order, begin = np.array(_ORDER.get(key, range(size))), file.at
         vertices = numbering.points_of(file.integers(number * size).reshape(number, size)[:, order])
         if version < _NEWER:

@@ -4,7 +4,8 @@ A node has its number, one that says nothing, and three coordinates; an element 
 its type, and its nodes; an element of the boundary has those of two elements beside it before its type. A type is a
 number for the shape, and two digits for how many nodes. mesh.names may say what bodies and boundaries are called.
 
-Source: CSC, "ElmerSolver Manual", appendices "Format of mesh files" and "Element types"; CSC, "ElmerGrid Manual".
+Source: CSC, "ElmerSolver Manual", appendices "Format of mesh files" and "Element types"; CSC, "ElmerGrid Manual"; for
+the nodes of second order Elmer, "elements.def".
 """
 
 from __future__ import annotations
@@ -41,6 +42,12 @@ _NAME = re.compile(r"(?m)^[ \t]*\$[ \t]*(\S.*?)[ \t]*=[ \t]*(\d{1,18})[ \t]*\r?$
 _BODY = "elmer:body"
 _SHAPES = {
     1: "vertex", 2: "line", 3: "triangle", 4: "quad", 5: "tetra", 6: "pyramid", 7: "wedge", 8: "hexahedron",
+}  # fmt: skip
+# Elements of second order whose nodes are known, and which of them stands in each place of the table of elements.
+_SECOND: dict[str, Sequence[int]] = {
+    "line3": range(3), "triangle6": range(6), "quad8": range(8), "quad9": range(9), "tetra10": range(10),
+    "pyramid13": range(13), "wedge15": range(15), "hexahedron20": (*range(12), 16, 17, 18, 19, 12, 13, 14, 15),
+    "hexahedron27": (*range(12), 16, 17, 18, 19, 12, 13, 14, 15, 23, 21, 20, 22, 24, 25, 26),
 }  # fmt: skip
 
 
@@ -112,11 +119,13 @@ def _add(runs: Runs, table: IntegerLines, before: int, numbering: Numbering, nam
         shape, size = _SHAPES.get(int(types[here[0]]) // 100, ""), int(types[here[0]]) % 100
         if not shape or size < ELEMENTS[shape].nodes:
             raise in_line(table.text, table.place(int(here[0])), f"elements of the type {types[here[0]]} are not known")
-        key = shape if size == ELEMENTS[shape].nodes else f"{shape}_of_{size}"
+        key = shape if size == ELEMENTS[shape].nodes else f"{shape}{size}"
+        order = np.array(_SECOND.get(key, range(size)))
+        key = key if size == ELEMENTS[shape].nodes or key in _SECOND else f"{shape}_of_{size}"
         _check_counts(table, here, before + 2 + size)
-        nodes = table.integers(before + 2, before + 2 + size, here)
+        nodes = table.integers(before + 2, before + 2 + size, here)[:, order]
         cells = Cells(key, numbering.points_of(nodes, rows[here, 0]), rows[here, 0] if at is not None else None)
-        corners = _not_turned if at is None else partial(_corners, table, before + 2, size, here, at)
+        corners = _not_turned if at is None else partial(_corners, table, before + 2, order, here, at)
         run, mine = len(runs.cells), bodies[here]
         runs.add(cells, corners, {_BODY: mine})
         for number in np.unique(mine).tolist() if at is None else ():
@@ -125,8 +134,8 @@ def _add(runs: Runs, table: IntegerLines, before: int, numbering: Numbering, nam
             runs.put(name, run, np.flatnonzero(mine == number))
 
 
-def _corners(table: IntegerLines, first: int, size: int, here: Int64, at: int) -> Places:
-    return Places.of_text(table.columns(first, first + size, here) + at, "i8")
+def _corners(table: IntegerLines, first: int, order: Int64, here: Int64, at: int) -> Places:
+    return Places.of_text(table.columns(first, first + len(order), here)[:, order] + at, "i8")
 
 
 def _not_turned() -> Places:

@@ -9,10 +9,12 @@ import pytest
 from elements import MESHES
 from files_comsol import FILES, file, mesh, selection
 from files_medit import material
+from second_order import element, reference
 from shapes import block
 
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.comsol import parse
 from meshfix_cli.meshfile.groups import groups_of
 
@@ -60,10 +62,23 @@ def test_points_run_along_the_axes_of_an_element(dimension: int, tmp_path: Path)
         np.testing.assert_array_equal(run.vertices, some)
 
 
-def test_second_order_is_held(tmp_path: Path) -> None:
-    more = ("tri2", np.array([[0, 1, 4, 2, 3, 4]]), None)
+@pytest.mark.parametrize("key", ["line3", "triangle6", "quad9", "tetra10", "hexahedron27"])
+def test_points_of_second_order_run_along_the_axes_behind_the_corners(key: str) -> None:
+    nodes, corners = element(key), ELEMENTS[key].shape.corners
+    rank = np.lexsort(reference(key).T)  # by z, then y, then x
+    order = [*rank[rank < corners], *rank[rank >= corners]]
+    name = {"line": "edg", "triangle": "tri", "quad": "quad", "tetra": "tet", "hexahedron": "hex"}[
+        key.rstrip("0123456789")
+    ]
+    source = parse(file(mesh(nodes[np.array(order)], [(f"{name}2", np.arange(len(nodes))[None], None)])).encode())
+    assert source.cells[0].type == key
+    np.testing.assert_allclose(source.points[source.cells[0].vertices[0]], nodes, atol=1e-6)
+
+
+def test_second_order_of_which_little_is_known_is_held(tmp_path: Path) -> None:
+    more = ("quad2", np.array([[0, 1, 4, 2, 3, 4, 1, 0]]), None)
     (tmp_path / "in.mphtxt").write_text(file(mesh(POINTS, [("tri", CELLS, ENTITIES), more])))
-    assert read(tmp_path / "in.mphtxt").not_judged == {"triangle_of_6": 1}
+    assert read(tmp_path / "in.mphtxt").not_judged == {"quad_of_8": 1}
 
 
 def test_other_objects_are_told() -> None:

@@ -10,10 +10,13 @@ from commands import error_line, run
 from elements import MESHES
 from files_elmer import FILES, read_independently
 from files_medit import material, rows
+from second_order import reference
 from shapes import block
 
 from meshfix_cli import read
 from meshfix_cli.errors import MeshfixError, ReadError
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.meshfile.elmer import parse
 from meshfix_cli.meshfile.solved import turned
 
 
@@ -77,13 +80,43 @@ def test_elements_of_every_type(tmp_path: Path) -> None:
     listed = [[types[key], *row] for key, some in blocks for row in (some + 1).tolist()]
     (tmp_path / "m.header").write_text(f"{len(points)} {len(listed) + 1} 0\n0\n")
     (tmp_path / "m.nodes").write_text(rows([i, -1, *map(repr, p)] for i, p in enumerate(points.tolist(), 1)))
-    held = [9999, 1, 510, *range(1, 11)]
+    held = [9999, 1, 520, *range(1, 21)]
     (tmp_path / "m.elements").write_text(rows([*([i, 1, *row] for i, row in enumerate(listed, 1)), held]))
     document = read(tmp_path / "m.header")
     assert document.mesh.check()[0] == 0
     assert not document.mesh.topology.flipped.any()
     assert document.mesh.topology.m == len(listed)
-    assert document.not_judged == {"tetra_of_10": 1}
+    assert document.not_judged == {"tetra_of_20": 1}
+
+
+# From the list of its elements: nodes behind the corners of the three that are not as VTK has them, or may seem so.
+OF_ELMER = {
+    715: [".5 0 0", ".5 .5 0", "0 .5 0", ".5 0 1", ".5 .5 1", "0 .5 1", "0 0 .5", "1 0 .5", "0 1 .5"],
+    820: [
+        ".5 0 0", "1 .5 0", ".5 1 0", "0 .5 0", "0 0 .5", "1 0 .5", "1 1 .5", "0 1 .5",
+        ".5 0 1", "1 .5 1", ".5 1 1", "0 .5 1",
+    ],
+}  # fmt: skip
+OF_ELMER[827] = [*OF_ELMER[820], ".5 0 .5", "1 .5 .5", ".5 1 .5", "0 .5 .5", ".5 .5 0", ".5 .5 1", ".5 .5 .5"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "key"),
+    [
+        (203, "line3"), (306, "triangle6"), (408, "quad8"), (409, "quad9"), (510, "tetra10"), (613, "pyramid13"),
+        (715, "wedge15"), (820, "hexahedron20"), (827, "hexahedron27"),
+    ],
+)  # fmt: skip
+def test_nodes_of_second_order_come_in_the_order_of_vtk(kind: int, key: str, tmp_path: Path) -> None:
+    nodes, corners = reference(key), ELEMENTS[key].shape.corners
+    if kind in OF_ELMER:
+        nodes = np.concatenate([nodes[:corners], [[float(x) for x in one.split()] for one in OF_ELMER[kind]]])
+    (tmp_path / "m.header").write_text(f"{len(nodes)} 1 0\n0\n")
+    (tmp_path / "m.nodes").write_text(rows([i, -1, *map(repr, p)] for i, p in enumerate(nodes.tolist(), 1)))
+    (tmp_path / "m.elements").write_text(rows([[1, 1, kind, *range(1, len(nodes) + 1)]]))
+    source = parse(b"", tmp_path / "m.header")
+    assert source.cells[0].type == key
+    np.testing.assert_array_equal(source.points[source.cells[0].vertices[0]], reference(key))
 
 
 def test_the_orientation_is_mended_in_the_file(tmp_path: Path) -> None:

@@ -31,11 +31,17 @@ def middles(key: str, corners: NDArray[Any]) -> NDArray[Any]:
     return np.stack([corners[..., [int(one) for one in word], :].mean(axis=-2) for word in BETWEEN[key].split()], -2)
 
 
+def reference(key: str) -> NDArray[np.float64]:
+    """Nodes (k, 3), in VTK's order, of an element whose sides are along the axes."""
+    corners = np.zeros((ELEMENTS[key].shape.corners, 3))
+    known = _CORNERS[ELEMENTS[key].shape.name]
+    corners[:, : len(known[0])] = known
+    return np.concatenate([corners, middles(key, corners)])
+
+
 def element(key: str) -> NDArray[np.float64]:
     """Nodes (k, 3), in VTK's order, of a straight element of which no two sides are alike; five digits or fewer."""
-    name = ELEMENTS[key].shape.name
-    corners = np.zeros((len(_CORNERS[name]), 3))
-    corners[:, : len(_CORNERS[name][0])] = _CORNERS[name]
+    corners = reference(key)[: ELEMENTS[key].shape.corners]
     skew = np.random.default_rng(len(corners)).integers(-8, 9, corners.shape) / 64
     corners[:, :2] += skew[:, :2]
     corners[:, 2] += skew[:, 2] * (ELEMENTS[key].shape.dimension == 3)

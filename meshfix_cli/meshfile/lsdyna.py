@@ -215,7 +215,8 @@ def _types(kind: str, nodes: Int64) -> Iterator[tuple[str, list[int], Int64]]:
         three = ~more & (~there[:, 3:4] | (nodes[:, 3:4] == nodes[:, 2:3])).all(
             axis=1
         )  # also where there are but three
-        choices = [("triangle", 3, three), ("quad", 4, ~more), ("quad_of_8", 4, more)]
+        whole = there.all(axis=1) & (nodes[:, 2] != nodes[:, 3:4].sum(axis=1)) & (size == 8)
+        choices = [("triangle", 3, three), ("quad", 4, ~more), ("quad8", 8, whole), ("quad_of_8", 4, more)]
     else:
         many = there[:, 8:].any(axis=1)
         choices = [("tetra10", size, many), ("tetra", 4, tips & (kind == "SOLID")), ("hexahedron", 8, left.copy())]
@@ -268,4 +269,4 @@ def _sets(
     return found
 
 
-_FLAT = ("triangle", "quad", "quad_of_8")
+_FLAT = ("triangle", "quad", "quad8", "quad_of_8")

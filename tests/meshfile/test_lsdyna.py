@@ -9,6 +9,7 @@ import pytest
 from elements import MESHES
 from files_lsdyna import FILES, nodes
 from files_medit import material
+from second_order import element, is_straight
 from shapes import block
 
 from meshfix_cli import read
@@ -102,6 +103,23 @@ def test_a_curved_element_among_others_is_refused(tmp_path: Path) -> None:
     text += cards(9999, 1) + cards(*range(1, 11))
     with pytest.raises(ReadError, match=rf"1 of {len(tetra) + 1} elements is curved \(tetrahedra of 10 nodes\)"):
         read_text(tmp_path, f"*KEYWORD\n*NODE\n{nodes(points)}*ELEMENT_SOLID\n{text}*END\n")
+
+
+@pytest.mark.parametrize("key", ["quad8", "tetra10"])
+def test_nodes_of_second_order_come_in_the_order_of_vtk(key: str) -> None:
+    """As in the manual; of shells and solids of ten nodes gmsh writes the same."""
+    points = element(key)
+    shell = cards(1, 1, *range(1, 9))
+    text = f"*ELEMENT_SHELL\n{shell}" if key == "quad8" else f"*ELEMENT_SOLID\n{cards(1, 1)}{cards(*range(1, 11))}"
+    (run,) = parse(f"*KEYWORD\n*NODE\n{nodes(points)}{text}*END\n".encode()).cells
+    assert run.type == key
+    assert is_straight(key, points[run.vertices], 1e-6)
+
+
+def test_shells_that_lack_nodes_of_their_edges_are_held() -> None:
+    for some in ((1, 2, 3, 4, 5, 6, 7, 0), (1, 2, 3, 3, 5, 6, 7, 7)):
+        (run,) = parse(f"*NODE\n{nodes(element('quad8'))}*ELEMENT_SHELL\n{cards(1, 1, *some)}*END\n".encode()).cells
+        assert run.type == "quad_of_8"
 
 
 def test_included_files_are_told(tmp_path: Path) -> None:

@@ -215,7 +215,7 @@ def _types(kind: str, nodes: Int64) -> Iterator[tuple[str, list[int], Int64]]:
         three = ~more & (~there[:, 3:4] | (nodes[:, 3:4] == nodes[:, 2:3])).all(
             axis=1
         )  # also where there are but three
-        whole = there.all(axis=1) & (nodes[:, 2] != nodes[:, 3:4].sum(axis=1)) & (size == 8)
+        whole = there.all(axis=1) & ~(nodes[:, 3:4] == nodes[:, 2:3]).any(axis=1) & (size == 8)
         choices = [("triangle", 3, three), ("quad", 4, ~more), ("quad8", 8, whole), ("quad_of_8", 4, more)]
     else:
         many = there[:, 8:].any(axis=1)

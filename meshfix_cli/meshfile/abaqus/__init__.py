@@ -32,6 +32,8 @@ _FACE = re.compile(
 _SOLID = re.compile(r"(?:[A-Z]{0,3}C3D|Q3D|SC)(4|5|6|8|10|15|20)(?![\dV])")
 _PLANE = re.compile(r"(?:CPS|CPEG?|(?:DC?|A|CG)?CAX|CGAX|[A-Z]{0,2}C2D|WARP2D|M3D|R3D|SFM3D|D?S|STRI)(3|4|6|8|9)(?!\d)")
 _SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
+# Solids that may lack some of their nodes: they are held, and named as what they are.
+_LACKING = {"C3D15V": "wedge", "C3D27": "hexahedron"}
 _PLANES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 
 
@@ -152,10 +154,11 @@ def _other_cells(deck: Deck, block: Block, nodes: Labels, name: str) -> Cells:
     spans, starts = _lines_of_words(deck, block)
     ids, counts = integers_at(deck.text, spans[starts]), np.diff(starts, append=len(spans)) - 1
     vertices = _named_vertices(deck, block, nodes, np.delete(spans, starts, axis=0), np.repeat(ids, counts))
+    held = f"{next((shape for begin, shape in _LACKING.items() if name.startswith(begin)), 'abaqus')}:{name}"
     if len({*counts.tolist()}) != 1:
-        return Cells(f"abaqus:{name}", np.split(vertices, np.cumsum(counts)[:-1]) if len(ids) else [], ids)
+        return Cells(held, np.split(vertices, np.cumsum(counts)[:-1]) if len(ids) else [], ids)
     corners = int(counts[0])
-    kind = {1: "vertex", 2: "line"}.get(corners, f"abaqus:{name}")
+    kind = {1: "vertex", 2: "line"}.get(corners, held)
     return Cells(kind, vertices.reshape(len(ids), corners), ids)
 
 

@@ -9,7 +9,7 @@ import io
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
@@ -25,6 +25,7 @@ from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.gmsh import cells as gmsh
 from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.solved import solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
@@ -58,7 +59,10 @@ _CLOCKS = {
 }
 _NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
 _STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
-_ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
+# Which of the format's nodes stands where ours do; for gmsh meshio sees to it with all but these.
+_ORDERS: Mapping[str, Mapping[str, Sequence[int]]] = {
+    "med": med.ORDER, "exodus": exodus.ORDER, "gmsh": {key: gmsh.ORDER[key] for key in ("wedge18", "pyramid14")},
+}  # fmt: skip
 
 
 def read(data: bytes, form: Format, path: Path | None = None) -> Source:

@@ -11,8 +11,8 @@ from programs import gmsh_session
 from second_order import BETWEEN, element, is_straight
 
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile import formats, reading
-from meshfix_cli.meshfile.source import Source
+from meshfix_cli.meshfile import formats, reading, through_meshio
+from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 
 
@@ -103,3 +103,16 @@ def check(path: Path, key: str, tolerance: float = 1e-6) -> None:
     turned = source.layout.rewritten(source.points, source.points, {at: Turned(np.array([0]), order.tolist())})
     path.write_bytes(turned)
     np.testing.assert_array_equal(source_of(path).cells[at].vertices, run.vertices[:, order])
+
+
+WRITTEN = ["triangle6", "quad8", "quad9", "tetra10", "hexahedron20", "hexahedron27"]
+FURTHER = {"gmsh": ["wedge18", "pyramid14"], "gmsh22": ["wedge18", "pyramid14"], "vtu": ["wedge18"], "exodus": []}
+
+
+@pytest.mark.parametrize(("name", "key"), [(name, key) for name, more in FURTHER.items() for key in (*WRITTEN, *more)])
+def test_what_is_written_in_another_format_has_the_order_of_that(name: str, key: str, tmp_path: Path) -> None:
+    points = element(key)
+    path = tmp_path / {"exodus": "one.e", "vtu": "one.vtu"}.get(name, "one.msh")
+    form = formats.Format(name, None if name == "exodus" else False)
+    through_meshio.write(path, Source(points, [Cells(key, np.arange(len(points))[None])]), points, form)
+    check(path, key)

@@ -9,7 +9,7 @@ import io
 import os
 import re
 import tempfile
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError, together
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
+from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.formats import Format
@@ -59,9 +60,12 @@ _CLOCKS = {
 }
 _NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
 _STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
-# Which of the format's nodes stands where ours do; for gmsh meshio sees to it with all but these.
-_ORDERS: Mapping[str, Mapping[str, Sequence[int]]] = {
-    "med": med.ORDER, "exodus": exodus.ORDER, "gmsh": {key: gmsh.ORDER[key] for key in ("wedge18", "pyramid14")},
+_ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
+_ORDERED = ("tetra10", "pyramid13", "wedge15", "hexahedron20", "hexahedron27")  # by meshio itself, for gmsh
+# What it calls elements of more than second order for VTK, in whose order they are.
+_LAGRANGE = {
+    "line": "CURVE", "triangle": "TRIANGLE", "quad": "QUADRILATERAL", "tetra": "TETRAHEDRON", "wedge": "WEDGE",
+    "hexahedron": "HEXAHEDRON",
 }  # fmt: skip
 
 
@@ -165,7 +169,7 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
     sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(
         points,
-        [(source.cells[i].type, _in_order_of(form, source.cells[i])) for i in kept],
+        [(_name_in(form, source.cells[i].type), _in_order_of(form, source.cells[i])) for i in kept],
         point_data={name(key): values("", array) for key, array in arrays.point.items()},
         cell_data={key: [values(key, array) for array in runs] for key, runs in cell.items()},
         # The numbers of sets of groups are not those of the groups.
@@ -175,9 +179,17 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
     )
 
 
+def _name_in(form: Format, key: str) -> str:
+    """Return what meshio calls cells of a type."""
+    kind = kinds().get(key) if form.reader in _TURNED and key not in ELEMENTS else None
+    return f"VTK_LAGRANGE_{_LAGRANGE[kind.family]}" if kind and kind.complete and kind.family in _LAGRANGE else key
+
+
 def _in_order_of(form: Format, run: Cells) -> Any:
     """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, and no others."""
     order = _ORDERS.get(form.reader, {}).get(run.type)
+    if form.reader == "gmsh" and run.type not in _ORDERED:
+        order = gmsh.order_of(run.type)
     if order is not None:
         return run.vertices[:, np.argsort(order)]
     return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices

@@ -7,13 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from programs import gmsh_session
-from second_order import BETWEEN, element, is_straight
+from second_order import BETWEEN, element, is_straight, reference
 
 from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.lagrange import kinds, lattice
 from meshfix_cli.meshfile import formats, reading, through_meshio
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import Turned
+from meshfix_cli.meshfile.vtk.cells import TYPES
 
 
 def source_of(path: Path) -> Source:
@@ -69,27 +72,78 @@ def test_gmsh_writes_elements_whose_nodes_come_in_the_order_of_vtk(name: str, ke
 @pytest.mark.parametrize("key", [key for key in BETWEEN if ELEMENTS[key].vtk])
 @pytest.mark.parametrize("name", ["vtk", "vtk binary", "vtu", "vtu ascii"])
 def test_vtk_writes_elements_whose_nodes_come_in_its_order(name: str, key: str, tmp_path: Path) -> None:
+    kind = ELEMENTS[key].vtk
+    assert kind is not None
+    vtk_writes(path := tmp_path / f"one.{name[:3]}", kind, element(key), name)
+    check(path, key)
+
+
+def vtk_writes(path: Path, kind: int, nodes: NDArray[np.float64], how: str = "") -> None:
+    """Let VTK write a cell, binary or ascii."""
     pytest.importorskip("vtk")
     from vtkmodules.util.numpy_support import numpy_to_vtk
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkUnstructuredGrid
 
-    grid, points, nodes = vtkUnstructuredGrid(), vtkPoints(), element(key)
+    grid, points = vtkUnstructuredGrid(), vtkPoints()
     points.SetData(numpy_to_vtk(nodes, deep=True))
     grid.SetPoints(points)
-    kind = ELEMENTS[key].vtk
-    assert kind is not None
     grid.InsertNextCell(kind, len(nodes), list(range(len(nodes))))
-    module, prefix = {"vtk": ("Legacy", ""), "vtu": ("XML", "XML")}[name[:3]]
+    module, prefix = {".vtk": ("Legacy", ""), ".vtu": ("XML", "XML")}[path.suffix]
     writer = getattr(pytest.importorskip(f"vtkmodules.vtkIO{module}"), f"vtk{prefix}UnstructuredGridWriter")()
-    if name == "vtk binary":
+    if how == "vtk binary":
         writer.SetFileTypeToBinary()
-    if name == "vtu ascii":
+    if how == "vtu ascii":
         writer.SetDataModeToAscii()
-    writer.SetFileName(str(path := tmp_path / f"one.{name[:3]}"))
+    writer.SetFileName(str(path))
     writer.SetInputData(grid)
     writer.Write()
-    check(path, key)
+
+
+LAGRANGE = {68: "line", 69: "triangle", 70: "quad", 71: "tetra", 72: "hexahedron", 73: "wedge"}
+
+
+@pytest.mark.parametrize("number", LAGRANGE)
+@pytest.mark.parametrize("suffix", ["vtk", "vtu"])
+def test_lagrange_cells_are_elements_of_their_order(suffix: str, number: int, tmp_path: Path) -> None:
+    family = LAGRANGE[number]
+    for order in (1, 2, 3, 5):
+        nodes = np.zeros((len(lattice(family, order, "vtk")), 3))
+        nodes[:, : len(lattice(family, 1)[0])] = lattice(family, order, "vtk")
+        vtk_writes(path := tmp_path / f"one.{suffix}", number, nodes)
+        (run,) = source_of(path).cells
+        assert run.type == (family if order == 1 else f"{family}{len(nodes)}")
+        assert run.vertices.tolist() == [[*range(len(nodes))]]
+
+
+@pytest.mark.parametrize("number", [70, 72, 74, 79])
+@pytest.mark.parametrize("suffix", ["vtk", "vtu"])
+def test_cells_whose_nodes_are_not_known_have_the_names_of_vtk(suffix: str, number: int, tmp_path: Path) -> None:
+    """Hexahedra of VTK 8, pyramids, Bezier's, and those that have another order along each axis."""
+    nodes = np.random.default_rng(1).random(({70: 12, 74: 30}.get(number, 64), 3))
+    vtk_writes(path := tmp_path / f"one.{suffix}", number, nodes, f"{suffix} ascii")
+    data = path.read_bytes()
+    for new, old in ((b"Version 5.1", b"Version 5.0"), (b'version="2.', b'version="1.')) if number == 72 else ():
+        data = data.replace(new, old)
+    path.write_bytes(data)
+    (run,) = source_of(path).cells
+    assert run.type == TYPES[number][0]
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_elements_of_more_than_second_order_by_gmsh(order: int, tmp_path: Path) -> None:
+    for family in ("triangle", "quad", "tetra", "pyramid", "wedge", "hexahedron"):
+        nodes, shape = reference(family), ELEMENTS[family].shape
+        with gmsh_session(SaveAll=1) as gmsh:
+            gmsh.model.addDiscreteEntity(shape.dimension, 1)
+            gmsh.model.mesh.addNodes(shape.dimension, 1, np.arange(shape.corners) + 1, nodes.ravel())
+            gmsh.model.mesh.addElementsByType(1, ELEMENTS[family].gmsh, [], np.arange(shape.corners) + 1)
+            gmsh.model.mesh.setOrder(order)
+            gmsh.write(str(path := tmp_path / "one.msh"))
+        source = source_of(path)
+        (run,) = source.cells
+        found, weights = source.points[run.vertices[0]], np.array(kinds()[run.type].weights)
+        np.testing.assert_allclose(found, weights @ found[: shape.corners], atol=1e-12, err_msg=run.type)
 
 
 def check(path: Path, key: str, tolerance: float = 1e-6) -> None:

@@ -36,7 +36,7 @@ def reference(key: str) -> NDArray[np.float64]:
     corners = np.zeros((ELEMENTS[key].shape.corners, 3))
     known = _CORNERS[ELEMENTS[key].shape.name]
     corners[:, : len(known[0])] = known
-    return np.concatenate([corners, middles(key, corners)])
+    return np.concatenate([corners, middles(key, corners)]) if key in BETWEEN else corners
 
 
 def element(key: str) -> NDArray[np.float64]:

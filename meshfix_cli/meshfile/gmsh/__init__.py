@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, naming
 from meshfix_cli.mesh.elements import counted, dimension_of
-from meshfix_cli.meshfile.gmsh.cells import ORDER, TYPES
+from meshfix_cli.meshfile.gmsh.cells import TYPES, order_of
 from meshfix_cli.meshfile.gmsh.numbers import Int64
 from meshfix_cli.meshfile.gmsh.sections import Block, File, Numbers, UnknownError, read
 from meshfix_cli.meshfile.solved import solved_runs
@@ -111,12 +111,12 @@ def _vertices(block: Block, find: Callable[[Int64], Int64]) -> Int64:
     if missing.any():
         element = block.ids[missing.any(axis=1)][0]
         raise ReadError(f"the element {element} has the node {block.nodes[missing][0]}, which is not in $Nodes")
-    order = ORDER.get(TYPES[block.kind][0])
+    order = order_of(TYPES[block.kind][0])
     return rows if order is None else rows[:, order]
 
 
 def _corners(block: Block) -> Places:
-    order = ORDER.get(TYPES[block.kind][0])
+    order = order_of(TYPES[block.kind][0])
     return block.corners() if order is None else block.corners().at((slice(None), order))
 
 

@@ -5,7 +5,10 @@ Source: "Gmsh Reference Manual", section "Legacy formats", table of `elm-type`; 
 
 from __future__ import annotations
 
+from functools import cache
+
 from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.lagrange import kinds
 
 _HIGHER = {  # beside those of the table of elements the number of each type: how many nodes it has
     "line": {84: 1, 27: 5, 28: 6, 62: 7, 63: 8, 64: 9, 65: 10, 66: 11},
@@ -39,15 +42,11 @@ TYPES = {
     for family, sizes in _HIGHER.items()
     for kind, size in sizes.items()
 } | {element.gmsh: (key, element.nodes) for key, element in ELEMENTS.items() if element.gmsh is not None}
-# Where the table of elements, which follows VTK, has another order: which of gmsh's nodes stands there.
-_ON_HEXAHEDRON = [8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]
-_ON_WEDGE, _ON_PYRAMID = [6, 9, 7, 12, 14, 13, 8, 10, 11], [5, 8, 10, 6, 7, 9, 11, 12]
-ORDER = {
-    "tetra10": [*range(8), 9, 8],
-    "hexahedron20": [*range(8), *_ON_HEXAHEDRON],
-    "hexahedron27": [*range(8), *_ON_HEXAHEDRON, 22, 23, 21, 24, 20, 25, 26],
-    "wedge15": [*range(6), *_ON_WEDGE],
-    "wedge18": [*range(6), *_ON_WEDGE, 15, 17, 16],
-    "pyramid13": [*range(5), *_ON_PYRAMID],
-    "pyramid14": [*range(5), *_ON_PYRAMID, 13],
-}
+
+
+@cache
+def order_of(key: str) -> list[int] | None:
+    """Return which of gmsh's nodes stands in each place of the table of elements, which follows VTK; None: its own."""
+    kind = kinds().get(key)
+    order = [] if kind is None else kind.order_of("gmsh")
+    return order if order != [*range(len(order))] else None

@@ -1,6 +1,6 @@
 """The cells of VTK, which its legacy and XML files share: their numbers, names and runs.
 
-Source: VTK, "vtkCellType.h".
+Source: VTK, "vtkCellType.h"; for what is older "vtkXMLUnstructuredDataReader.cxx" and "vtkUnstructuredGridReader.cxx".
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, counted
+from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile.source import Cells, regions_among
 from meshfix_cli.meshfile.tables import alike
 
@@ -27,6 +28,8 @@ TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() 
     78: ("VTK_BEZIER_TETRAHEDRON", 0), 79: ("VTK_BEZIER_HEXAHEDRON", 0), 80: ("VTK_BEZIER_WEDGE", 0),
     81: ("VTK_BEZIER_PYRAMID", 0),
 }  # fmt: skip
+# Of any order, by the number of nodes; Bezier's have nodes that lie elsewhere, and VTK knows no pyramids of these.
+_LAGRANGE = {68: "line", 69: "triangle", 70: "quad", 71: "tetra", 72: "hexahedron", 73: "wedge"}
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 
 
@@ -53,7 +56,10 @@ class Run(NamedTuple):
 
 
 def runs(
-    types: NDArray[np.integer[Any]], offsets: NDArray[np.int64], connectivity: NDArray[np.integer[Any]]
+    types: NDArray[np.integer[Any]],
+    offsets: NDArray[np.int64],
+    connectivity: NDArray[np.integer[Any]],
+    old: bool = False,
 ) -> list[Run]:
     """Cut cells into runs, in the order of the file where they are not too many.
 
@@ -64,6 +70,8 @@ def runs(
     offsets : (m+1,) int64
         Cell i has the vertices `connectivity[offsets[i]:offsets[i + 1]]`.
     connectivity : (k,) int
+    old : bool
+        The file is of VTK 8 or before, where hexahedra of any order have another order of nodes.
 
     Raises
     ------
@@ -79,6 +87,8 @@ def runs(
         name, expected = TYPES.get(number, (f"vtk{number}", 0))
         if name == "polygon":
             name = {3: "triangle", 4: "quad"}.get(size, name)
+        if number in _LAGRANGE:
+            name = _lagrange(_LAGRANGE[number], size, old) or name
         if expected not in (0, size):
             corners = counted(size, "vertex", "vertices")
             raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {corners}")
@@ -88,6 +98,14 @@ def runs(
             vertices = connectivity[offsets[rows][:, None] + np.arange(size)]
         found.append(Run(name, rows, vertices))
     return found
+
+
+def _lagrange(family: str, size: int, old: bool) -> str | None:
+    """Return the type of elements of any order; None: their nodes are not known."""
+    if size == ELEMENTS[family].nodes:
+        return family
+    kind = kinds().get(f"{family}{size}")
+    return f"{family}{size}" if kind and kind.complete and not (old and family == "hexahedron") else None
 
 
 def markings(

@@ -5,6 +5,7 @@ Source: "VTK File Formats", section Simple Legacy Formats; what that leaves open
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from functools import cache, partial
@@ -25,6 +26,7 @@ _POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
     b"vertices": (2, {1: 1}), b"lines": (4, {2: 3}), b"polygons": (7, {3: 5, 4: 9}), b"triangle_strips": (6, {})
 }  # fmt: skip
 _POLYHEDRON = 42
+_OLD = re.compile(rb"(?:\xef\xbb\xbf)?\s*# vtk DataFile Version\s+(?:[0-4](?!\d)|5\.0)")
 
 Integers = NDArray[np.int32] | NDArray[np.int64]
 
@@ -39,7 +41,8 @@ def parse(data: bytes) -> Source | None:
         raise ReadError("is truncated: the section POINTS is missing")
     if points.kind not in ("f4", "f8"):
         return None
-    pairs = [(table, run) for table in _tables(found) for run in runs(table.types, table.offsets, table.vertices)]
+    old = _OLD.match(data) is not None
+    pairs = [(table, run) for table in _tables(found) for run in runs(table.types, table.offsets, table.vertices, old)]
     layout = InPlace(data, points.rows(), [table.places(run) for table, run in pairs])
     rows = [table.first + run.rows if table.first else run.rows for table, run in pairs]
     load = cache(partial(_arrays, found, points.tuples, rows))

@@ -9,6 +9,7 @@ Source: VTK documentation, "VTK File Formats", section XML Formats.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -42,7 +43,8 @@ def parse(data: bytes) -> Source:
         raise ReadError("has points or vertices that share their bytes with another array, which meshfix does not read")
     numbers = [file.numbers(share.array, share.size).read() for share in shares]
     points = np.concatenate(numbers or [np.empty(0)]).reshape(-1, 3)
-    found = runs(cells.types, cells.offsets, cells.connectivity)
+    old = re.match(r"[01](?!\d)|2\.0", file.root.attributes.get("version", "0.1")) is not None
+    found = runs(cells.types, cells.offsets, cells.connectivity, old)
     layout = _Layout(file, points.dtype, shares, cells.shares, [cells.offsets[run.rows] for run in found])
     load = cache(lambda: _arrays(file, pieces, found))
     labels = {array.name for piece in pieces for array in piece.arrays("CellData")}

@@ -31,11 +31,12 @@ _CELLS = {
     "Hexahedra": ("hexahedron", 8), "Hexaedra": ("hexahedron", 8), "Prisms": ("wedge", 6), "Pentahedra": ("wedge", 6),
     "Pyramids": ("pyramid", 5),
     "EdgesP2": ("line3", 3), "TrianglesP2": ("triangle6", 6), "QuadrilateralsQ2": ("quad9", 9),
-    "TetrahedraP2": ("tetra10", 10), "HexahedraQ2": ("hexahedron27", 27), "PrismsP2": ("wedge18", 18),
-    "PyramidsP2": ("pyramid14", 14),
-    "EdgesP3": ("line4", 4), "TrianglesP3": ("triangle10", 10), "QuadrilateralsQ3": ("quad16", 16),
-    "TetrahedraP3": ("tetra20", 20), "EdgesP4": ("line5", 5), "TrianglesP4": ("triangle15", 15),
-    "QuadrilateralsQ4": ("quad25", 25), "TetrahedraP4": ("tetra35", 35),
+    "TetrahedraP2": ("tetra10", 10),
+    # Of these the order of nodes is not known, and they are held.
+    "HexahedraQ2": ("hexahedron_of_27", 27), "PrismsP2": ("wedge_of_18", 18), "PyramidsP2": ("pyramid_of_14", 14),
+    "EdgesP3": ("line_of_4", 4), "TrianglesP3": ("triangle_of_10", 10), "QuadrilateralsQ3": ("quad_of_16", 16),
+    "TetrahedraP3": ("tetra_of_20", 20), "EdgesP4": ("line_of_5", 5), "TrianglesP4": ("triangle_of_15", 15),
+    "QuadrilateralsQ4": ("quad_of_25", 25), "TetrahedraP4": ("tetra_of_35", 35),
 }  # fmt: skip
 _REF = "medit:ref"
 
@@ -107,6 +108,8 @@ def _sections(text: bytes, at: int) -> Iterator[_Section]:
             if dimension not in (2, 3):
                 raise ReadError(f"is not a readable medit file: its dimension is {dimension}")
             continue
+        if name.endswith("Ordering"):
+            raise ReadError(f"gives nodes an order of its own ({name}), which meshfix does not read")
         section = _section(text, name, at, dimension)
         known, at = section.rows is not None, section.end
         yield section

@@ -20,13 +20,25 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import CODES, IntegerLines, Numbering, Runs, check_blank, integer_lines, lines, without
+from meshfix_cli.meshfile.tables import (
+    CODES,
+    Int64,
+    IntegerLines,
+    Numbering,
+    Runs,
+    check_blank,
+    integer_lines,
+    lines,
+    without,
+)
 from meshfix_cli.meshfile.text import in_line, integers_at, numbers_at
 from meshfix_cli.meshfile.together import Together, all_there, beside_output
 
 _COMMENT = re.compile(rb"#[^\n\r]*")
 _REF = "tetgen:ref"
 _TYPES = {(2, 3): "triangle", (2, 6): "triangle6", (3, 4): "tetra", (3, 10): "tetra10"}
+# Which of the nodes stands in each place of the table of elements.
+_ORDER = {"triangle6": (0, 1, 2, 5, 3, 4), "tetra10": (0, 1, 2, 3, 6, 7, 9, 5, 8, 4)}
 _FACETS = {".face": ("triangle", 3), ".edge": ("line", 2)}
 _COPIED = (".face", ".edge", ".neigh", ".poly", ".smesh", ".mtr", ".vol", ".area", ".t2f", ".f2e", ".t2e", ".v.node")
 
@@ -75,11 +87,12 @@ def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple
             if (labels[_REF] < CODES).any():  # they may be any numbers
                 column = table.columns(1 + corners, 2 + corners)[:, 0]
                 labels[_REF] = numbers_at(table.text, column, np.dtype("f8"))
-        cells = Cells(kind, numbering.points_of(rows[:, 1:], rows[:, 0]), rows[:, 0])
-        runs.add(cells, partial(_corners, table, corners, len(nodes)), labels)
+        order = np.array(_ORDER.get(kind, range(corners)))
+        cells = Cells(kind, numbering.points_of(rows[:, 1:][:, order], rows[:, 0]), rows[:, 0])
+        runs.add(cells, partial(_corners, table, order, len(nodes)), labels)
     for suffix, data in facets.items():
         with naming(suffix):
-            _add_facets(runs, data, *_FACETS[suffix], numbering)
+            _add_facets(runs, data, *_FACETS[suffix], numbering, kind == "tetra10")
     layout = InPlace(nodes + elements, coordinates, runs.corners)
     untold = ("comments",) if b"#" in nodes or b"#" in elements else ()
     return Source(points, runs.cells, None, runs.arrays, (_REF,) * bool(labels), untold=untold), layout
@@ -103,16 +116,21 @@ def _integers(data: bytes, counts: int) -> tuple[list[int], IntegerLines]:
     return others, table
 
 
-def _corners(table: IntegerLines, count: int, before: int) -> Places:
-    return Places.of_text(table.columns(1, 1 + count) + before, "i8")
+def _corners(table: IntegerLines, order: Int64, before: int) -> Places:
+    return Places.of_text(table.columns(1, 1 + len(order))[:, order] + before, "i8")
 
 
-def _add_facets(runs: Runs, data: bytes, kind: str, corners: int, numbering: Numbering) -> None:
-    """Take the facets that have a marker, which are boundaries and interfaces: others may be inside."""
+def _add_facets(runs: Runs, data: bytes, kind: str, corners: int, numbering: Numbering, second: bool) -> None:
+    """Take the facets that have a marker, which are boundaries and interfaces: others may be inside.
+
+    Those of tetrahedra of second order have a node on each edge before it, as their element has.
+    """
     (markers,), table = _integers(data, 1)
     if markers < 1:
         return
-    marks = table.integers(1 + corners, 2 + corners)[:, 0]
+    at, more = 1 + corners, 3 if corners == 3 else 1
+    at += more if second and (table.counts > at + more).all() else 0
+    marks = table.integers(at, at + 1)[:, 0]
     rows = np.flatnonzero(marks != 0)
     facets = Cells(kind, numbering.points_of(table.integers(1, 1 + corners, rows)))
     runs.add(facets, _not_turned, {_REF: marks[rows]})

@@ -159,6 +159,13 @@ def test_a_plane_file_has_points_of_the_plane(tmp_path: Path) -> None:
     np.testing.assert_array_equal(parsed(made("freefem.mesh", tmp_path)).points, plate()[0][:, :2].astype(np.float32))
 
 
+def test_nodes_whose_order_is_not_known() -> None:
+    more = b"HexahedraQ2 1 " + b"1 " * 28 + b"TetrahedraP3 1 " + b"2 " * 21 + b"End"
+    assert [run.type for run in parsed(SMALL.replace(b"End", more)).cells[1:]] == ["hexahedron_of_27", "tetra_of_20"]
+    with pytest.raises(ReadError, match=r"gives nodes an order of its own \(TrianglesP2Ordering\), which meshfix does"):
+        parse(SMALL.replace(b"End", b"TrianglesP2Ordering 1 2 0\nEnd"))
+
+
 def test_cells_of_higher_order_and_old_names() -> None:
     more = b"EdgesP2 1 1 2 5 3\nHexaedra 1 1 2 3 4 5 1 2 3 9\nPentahedra 1 1 2 3 4 5 1 0\nQuadrilaterals 0\nEnd"
     source = parsed(SMALL.replace(b"End", more))

@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from commands import run
 from files_medit import material
-from files_tetgen import FILES, read_independently
+from files_tetgen import FILES, nodes, read_independently, table
+from second_order import element, is_straight
 from shapes import block
 
 from meshfix_cli import read
 from meshfix_cli.errors import MeshfixError, ReadError
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.solved import turned
+from meshfix_cli.meshfile.tetgen import parse
 
 files = pytest.mark.parametrize("name", FILES)
 
@@ -117,3 +120,22 @@ def test_no_file_of_the_input_is_replaced(tmp_path: Path) -> None:
     (tmp_path / "other.ele").symlink_to(path.with_suffix(".ele"))
     (tmp_path / "third.ele").symlink_to(path.with_suffix(".ele"))
     assert b"would replace a file of the input" in run("untangle", path, tmp_path / "third.node", code=1).stderr
+
+
+# By their manuals: between which corners the fifth node and those behind it, or the fourth, lie.
+SECOND = {"tetra10": "23 03 01 12 13 02", "triangle6": "12 20 01"}
+
+
+@pytest.mark.parametrize("key", SECOND)
+def test_nodes_of_second_order_come_in_the_order_of_vtk(key: str, tmp_path: Path) -> None:
+    d, corners = ELEMENTS[key].shape.dimension, ELEMENTS[key].shape.corners
+    points = element(key)[:corners]
+    points = np.concatenate([points, [points[[int(one) for one in word]].mean(axis=0) for word in SECOND[key].split()]])
+    (tmp_path / "in.node").write_text(nodes(points, d, 1, marker=False))
+    (tmp_path / "in.ele").write_text(f"1 {len(points)} 0\n{table(np.arange(len(points))[None] + 1, 1)}")
+    if d == 3:
+        (tmp_path / "in.face").write_text("2 1\n1 1 2 3 8 10 7 5\n2 1 2 4 9 6 7 0\n")
+    source = parse(b"", tmp_path / "in.node")
+    assert source.cells[0].type == key
+    assert is_straight(key, source.points[source.cells[0].vertices], 1e-5)
+    assert [run.vertices.tolist() for run in source.cells[1:]] == ([[[0, 1, 2]]] if d == 3 else [])

@@ -157,7 +157,7 @@ def test_cells_of_fenics_may_be_numbered_either_way() -> None:
 
 NAMES = {
     "vertex": ["Polyvertex"], "line": ["Polyline", "Interval"], "line3": ["Edge_3"],
-    "triangle": ["Triangle", "TRIANGLE"], "triangle6": ["Triangle_6", "Tri_6"], "triangle10": ["Triangle_10"],
+    "triangle": ["Triangle", "TRIANGLE"], "triangle6": ["Triangle_6", "Tri_6"], "triangle_of_10": ["Triangle_10"],
     "quad": ["Quadrilateral"], "quad8": ["Quadrilateral_8", "Quad_8"], "quad9": ["Quadrilateral_9", "Quad_9"],
     "tetra": ["Tetrahedron"], "tetra10": ["Tetrahedron_10", "Tet_10"], "pyramid": ["Pyramid"],
     "pyramid13": ["Pyramid_13"], "wedge": ["Wedge"], "wedge15": ["Wedge_15"], "wedge18": ["Wedge_18"],

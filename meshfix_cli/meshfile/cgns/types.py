@@ -28,9 +28,10 @@ _FAMILIES = {
     "hexahedron": {17: 8, 18: 20, 19: 27, 37: 32, 38: 56, 39: 64, 54: 44, 55: 98, 56: 125},
 }
 _LINEAR = (2, 3, 5, 7, 10, 12, 14, 17)
-# The name and the number of nodes.
+_SECOND = (4, 6, 8, 9, 11, 13, 15, 16, 18, 19, 21)
+# The name and the number of nodes; those of more than second order have an order of their own.
 TYPES = {
-    number: (family if number in _LINEAR else f"{family}{size}", size)
+    number: (family if number in _LINEAR else f"{family}{'' if number in _SECOND else '_of_'}{size}", size)
     for family, sizes in _FAMILIES.items()
     for number, size in sizes.items()
 }

@@ -80,7 +80,9 @@ def key_of(name: str, nodes: int, dimension: int) -> str:
     corners = ELEMENTS[shape].nodes
     if nodes < corners:
         raise ReadError(f"is not a readable exodus file: its {name} elements have {counted(nodes, 'node', 'nodes')}")
-    return shape if nodes == corners else f"{shape}{nodes}"
+    if nodes == corners:
+        return shape
+    return f"{shape}{nodes}" if f"{shape}{nodes}" in ELEMENTS else f"{shape}_of_{nodes}"
 
 
 def _shape(name: str, nodes: int, dimension: int) -> str:

@@ -25,7 +25,7 @@ _NUMBERS = {
     7: ("pyramid", 5), 8: ("wedge", 6), 9: ("hexahedron", 8), 34: ("line3", 3), 35: ("quad9", 9),
     36: ("triangle6", 6), 37: ("quad8", 8), 38: ("tetra10", 10), 39: ("pyramid13", 13), 40: ("wedge15", 15),
     41: ("wedge18", 18), 48: ("hexahedron20", 20), 49: ("hexahedron24", 24), 50: ("hexahedron27", 27),
-    51: ("hexahedron64", 64), 52: ("hexahedron125", 125),
+    51: ("hexahedron_of_64", 64), 52: ("hexahedron_of_125", 125),
 }  # fmt: skip
 _POLYHEDRON = 16  # its faces follow, each with the number of its vertices
 _SHAPES = {
@@ -127,7 +127,9 @@ def _type(kind: str, element: Element) -> tuple[str, int]:
         raise ReadError(f"has cells of the type {kind!r}, which is not known")
     corners = ELEMENTS[shape].nodes
     size = int(count) if count else nodes or corners
-    return (shape if size == corners else f"{shape}{size}"), size
+    if size == corners:
+        return shape, size
+    return (f"{shape}{size}" if f"{shape}{size}" in ELEMENTS else f"{shape}_of_{size}"), size
 
 
 def _mixed(values: NDArray[Any]) -> list[Run]:

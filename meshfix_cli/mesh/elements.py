@@ -13,7 +13,9 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
+
+from meshfix_cli.mesh.lagrange import Kind, kinds
 
 Rows = tuple[tuple[int, ...], ...]
 Weights = tuple[tuple[float, ...], ...]
@@ -100,6 +102,8 @@ class Element:
     between : str
         For each node that is no corner a word: the corners in whose middle it lies where the element is straight. One
         that counts twice stands there twice.
+    lattice : Kind or None
+        Where its nodes lie, instead, if it is of more than second order.
     """
 
     key: str
@@ -109,6 +113,7 @@ class Element:
     gmsh: int | None = None
     judged_by: str | None = None
     between: str = ""
+    lattice: Kind | None = None
 
     @property
     def linear(self) -> bool:
@@ -120,7 +125,8 @@ class Element:
         """The judged type of its corners, of which it is a refinement where its other nodes lie between them."""
         if self.judged_by:
             return self
-        return next((one for one in JUDGED if one.shape is self.shape), None) if self.between else None
+        higher = self.between or self.lattice
+        return next((one for one in JUDGED if one.shape is self.shape), None) if higher else None
 
     @cached_property
     def weights(self) -> Weights:
@@ -128,6 +134,8 @@ class Element:
 
         They are the values that the shape functions of the linear element have there.
         """
+        if self.lattice is not None:
+            return self.lattice.weights[self.shape.corners :]
         words, corners = self.between.split(), range(self.shape.corners)
         return tuple(tuple(word.count(str(corner)) / len(word) for corner in corners) for word in words)
 
@@ -256,7 +264,13 @@ _FAMILIES = {
 
 def element_of(key: str) -> Element | None:
     """Return the type that a file's cells are named by; None: no more is known of it than its name tells."""
-    return ELEMENTS.get(key)
+    return ELEMENTS.get(key) or _of_any_order(key)
+
+
+@cache
+def _of_any_order(key: str) -> Element | None:
+    kind = kinds().get(key)
+    return None if kind is None else Element(key, ELEMENTS[kind.family].shape, len(kind.places()), lattice=kind)
 
 
 def straight_key(key: str) -> str | None:

@@ -226,10 +226,11 @@ def turned(cells: Sequence[Cells], rows: Mapping[int, Int64]) -> dict[int, Turne
     found = {}
     for run, here in rows.items():
         key, _ = _REORDERED.get(cells[run].type, (cells[run].type, ()))
-        if key == _STRIP and len(here):
+        element = element_of(key)
+        if len(here) and (key == _STRIP or element is None):
             raise ReadError("has strips of triangles, of which none can be renumbered alone")
-        if len(here):
-            found[run] = Turned(np.sort(here), ELEMENTS[key].mirrored)
+        if len(here) and element is not None:
+            found[run] = Turned(np.sort(here), element.mirrored)
     return found
 
 

@@ -14,7 +14,7 @@ from building import Blocks, Points
 from programs import gmsh_session
 
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.gmsh.cells import ORDER
+from meshfix_cli.meshfile.gmsh.cells import order_of
 
 Made = Callable[[Path, Points, Blocks], None]
 
@@ -25,7 +25,7 @@ def by_gmsh(path: Path, points: Points, cells: Blocks, options: dict[str, float]
         gmsh.model.addDiscreteEntity(dimension, 1)
         gmsh.model.mesh.addNodes(dimension, 1, np.arange(len(points)) + 1, points.ravel())
         for key, rows in cells:
-            order = np.argsort(ORDER.get(key, range(rows.shape[1])))
+            order = np.argsort(order_of(key) or range(rows.shape[1]))
             gmsh.model.mesh.addElementsByType(1, ELEMENTS[key].gmsh, [], (rows[:, order] + 1).ravel())
         gmsh.write(str(path))
 

@@ -85,7 +85,10 @@ _VTK: dict[str, tuple[Rows, Rows]] = {
         ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7)),
     ),
 }  # fmt: skip
-ORDERS: Mapping[str, dict[str, tuple[Rows, Rows]]] = {"gmsh": _GMSH, "vtk": _VTK}
+_EDGES, _FACES = _VTK["hexahedron"]
+# VTK 8 and what was before it had the last two edges of hexahedra the other way round.
+_VTK_8 = {**_VTK, "hexahedron": ((*_EDGES[:-2], *_EDGES[:-3:-1]), _FACES)}
+ORDERS: Mapping[str, dict[str, tuple[Rows, Rows]]] = {"gmsh": _GMSH, "vtk": _VTK, "vtk 8": _VTK_8}
 _IN_ROWS = ("quad", "hexahedron", "triangle of wedge")  # what has rows of nodes inside, by VTK
 _AXES = {2: (1,), 3: (1, 2), 4: (1, 3), 8: (1, 3, 4)}  # towards which corners these go, by the number of corners
 
@@ -99,7 +102,7 @@ def lattice(family: str, order: int, by: str = "gmsh", complete: bool = True) ->
     family : str
         "line", "triangle", "quad", "tetra", "pyramid", "wedge" or "hexahedron".
     order : int
-    by : {"gmsh", "vtk"}
+    by : {"gmsh", "vtk", "vtk 8"}
         Whose order of nodes.
     complete : bool
         There are nodes also elsewhere than on edges.
@@ -192,7 +195,7 @@ def _nodes(family: str, corners: Sequence[Place], order: int, by: str, complete:
 
 def _inside(family: str, corners: Sequence[Place], order: int, by: str) -> Iterator[Place]:
     """Give the nodes that are on none of the sides."""
-    if family == "line" or (by == "vtk" and family in _IN_ROWS):
+    if family == "line" or (by != "gmsh" and family in _IN_ROWS):
         axes = [_step(corners[0], corners[i], order) for i in _AXES[len(corners)]]
         for steps in product(range(1, order), repeat=len(axes)):
             if len(corners) != 3 or sum(steps) < order:

@@ -190,6 +190,8 @@ def _in_order_of(form: Format, run: Cells) -> Any:
     order = _ORDERS.get(form.reader, {}).get(run.type)
     if form.reader == "gmsh" and run.type not in _ORDERED:
         order = gmsh.order_of(run.type)
+    if form.reader == "vtu" and run.type not in ELEMENTS and run.type in kinds():
+        order = kinds()[run.type].order_of("vtk 8")  # for meshio calls the file one of an old version
     if order is not None:
         return run.vertices[:, np.argsort(order)]
     return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices

@@ -30,6 +30,7 @@ TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() 
 }  # fmt: skip
 # Of any order, by the number of nodes; Bezier's have nodes that lie elsewhere, and VTK knows no pyramids of these.
 _LAGRANGE = {68: "line", 69: "triangle", 70: "quad", 71: "tetra", 72: "hexahedron", 73: "wedge"}
+_HEXAHEDRON = 72
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 
 
@@ -43,11 +44,14 @@ class Run(NamedTuple):
         Which cells of the file they are.
     vertices : (k, size) int
         In the order of VTK.
+    order : sequence of int or None
+        Which of the file's vertices stands in each place, where that is another.
     """
 
     type: str
     rows: NDArray[np.int64]
     vertices: NDArray[np.integer[Any]]
+    order: Sequence[int] | None = None
 
     @property
     def cells(self) -> Cells:
@@ -87,8 +91,7 @@ def runs(
         name, expected = TYPES.get(number, (f"vtk{number}", 0))
         if name == "polygon":
             name = {3: "triangle", 4: "quad"}.get(size, name)
-        if number in _LAGRANGE:
-            name = _lagrange(_LAGRANGE[number], size, old) or name
+        name = (_lagrange(_LAGRANGE[number], size) if number in _LAGRANGE else None) or name
         if expected not in (0, size):
             corners = counted(size, "vertex", "vertices")
             raise ReadError(f"is not a readable VTK file: its cell {rows[0]} is a {name} with {corners}")
@@ -96,16 +99,17 @@ def runs(
             vertices = connectivity[offsets[rows[0]] : offsets[rows[-1] + 1]].reshape(len(rows), size)
         else:
             vertices = connectivity[offsets[rows][:, None] + np.arange(size)]
-        found.append(Run(name, rows, vertices))
+        order = kinds()[name].order_of("vtk 8") if old and number == _HEXAHEDRON and name in kinds() else None
+        found.append(Run(name, rows, vertices if order is None else vertices[:, order], order))
     return found
 
 
-def _lagrange(family: str, size: int, old: bool) -> str | None:
+def _lagrange(family: str, size: int) -> str | None:
     """Return the type of elements of any order; None: their nodes are not known."""
     if size == ELEMENTS[family].nodes:
         return family
     kind = kinds().get(f"{family}{size}")
-    return f"{family}{size}" if kind and kind.complete and not (old and family == "hexahedron") else None
+    return f"{family}{size}" if kind and kind.complete else None
 
 
 def markings(

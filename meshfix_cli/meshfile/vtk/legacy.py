@@ -82,6 +82,9 @@ class _Table(NamedTuple):
     def places(self, run: Run) -> Callable[[], Places]:
         """Return what tells where the vertices of a run stand, and keeps none of the large arrays where it is whole."""
         (count, size), rows = run.vertices.shape, run.rows
+        if run.order is not None:
+            before = self.offsets[rows] + self.gap * (rows + 1)
+            return lambda: _places(self.numbers, lambda: before, size).at((slice(None), run.order))
         if count and rows[-1] - rows[0] == count - 1:
             first, step = int(self.offsets[rows[0]] + self.gap * (rows[0] + 1)), size + self.gap
             return partial(_places, self.numbers, lambda: first + step * np.arange(count), size)

@@ -45,7 +45,8 @@ def parse(data: bytes) -> Source:
     points = np.concatenate(numbers or [np.empty(0)]).reshape(-1, 3)
     old = re.match(r"[01](?!\d)|2\.0", file.root.attributes.get("version", "0.1")) is not None
     found = runs(cells.types, cells.offsets, cells.connectivity, old)
-    layout = _Layout(file, points.dtype, shares, cells.shares, [cells.offsets[run.rows] for run in found])
+    starts = [cells.offsets[run.rows] for run in found]
+    layout = _Layout(file, points.dtype, shares, cells.shares, starts, [run.order for run in found])
     load = cache(lambda: _arrays(file, pieces, found))
     labels = {array.name for piece in pieces for array in piece.arrays("CellData")}
     damaged = "is not a readable vtu file: its cell data {} are damaged, or not those of all pieces"
@@ -121,6 +122,8 @@ class _Layout:
     points, connectivity : sequence of _Share
     starts : sequence of (m,) int64
         For each run of cells where they begin in the connectivity.
+    orders : sequence
+        See `cells.Run`.
     """
 
     file: XmlFile
@@ -128,6 +131,7 @@ class _Layout:
     points: Sequence[_Share]
     connectivity: Sequence[_Share]
     starts: Sequence[NDArray[np.int64]]
+    orders: Sequence[Sequence[int] | None]
 
     def rounded(self, points: Points) -> Points:
         """Return points (n, 3) as the file can hold them."""
@@ -155,10 +159,15 @@ class _Layout:
     def _turned(self, reversed_cells: Mapping[int, Turned]) -> NDArray[np.int64]:
         """(2, k) int64: where in the connectivity another vertex will stand, and where each of these stands now."""
         parts = [
-            (self.starts[run][cells.rows][:, None] + cells.places[:, None]).reshape(2, -1)
+            (self.starts[run][cells.rows][:, None] + _placed(cells.places, self.orders[run])[:, None]).reshape(2, -1)
             for run, cells in reversed_cells.items()
         ]
         return np.concatenate([np.empty((2, 0), dtype=np.int64), *parts], axis=1)
+
+
+def _placed(places: NDArray[np.int64], order: Sequence[int] | None) -> NDArray[np.int64]:
+    """Return where places of VTK's order are in the file."""
+    return places if order is None else np.array(order, dtype=np.int64)[places]
 
 
 def _pieces(file: XmlFile) -> list[_Piece]:

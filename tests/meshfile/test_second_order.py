@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from programs import gmsh_session
-from second_order import BETWEEN, element, is_straight, reference
+from second_order import SECOND, element, is_straight, reference
 
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.lagrange import kinds, lattice
@@ -43,14 +43,14 @@ def gmsh_writes(path: Path, key: str, **options: float) -> None:
 
 
 LINES, PLANES, SOLIDS = ["line3"], ["triangle6", "quad8"], ["tetra10", "wedge15", "hexahedron20"]
-FULL = [key for key in BETWEEN if key not in ("pyramid13", "pyramid14")]
+FULL = [key for key in SECOND if key not in ("pyramid13", "pyramid14")]
 # What gmsh writes as its programs have it: the ending, its options, and the types.
 BY_GMSH: dict[str, tuple[str, dict[str, float], Iterable[str]]] = {
-    "1": ("msh", {"MshFileVersion": 1}, BETWEEN),
-    "2.2": ("msh", {"MshFileVersion": 2.2}, BETWEEN),
-    "2.2 binary": ("msh", {"MshFileVersion": 2.2, "Binary": 1}, BETWEEN),
-    "4.1": ("msh", {"MshFileVersion": 4.1}, BETWEEN),
-    "4.1 binary": ("msh", {"MshFileVersion": 4.1, "Binary": 1}, BETWEEN),
+    "1": ("msh", {"MshFileVersion": 1}, SECOND),
+    "2.2": ("msh", {"MshFileVersion": 2.2}, SECOND),
+    "2.2 binary": ("msh", {"MshFileVersion": 2.2, "Binary": 1}, SECOND),
+    "4.1": ("msh", {"MshFileVersion": 4.1}, SECOND),
+    "4.1 binary": ("msh", {"MshFileVersion": 4.1, "Binary": 1}, SECOND),
     "vtk": ("vtk", {}, FULL),
     "med": ("med", {}, [*FULL, "pyramid13"]),
     "unv": ("unv", {}, [*LINES, *PLANES, *SOLIDS]),
@@ -70,7 +70,7 @@ def test_gmsh_writes_elements_whose_nodes_come_in_the_order_of_vtk(name: str, ke
     check(path, key, 1e-3 if ending == "bdf" else 1e-6)
 
 
-@pytest.mark.parametrize("key", [key for key in BETWEEN if ELEMENTS[key].vtk])
+@pytest.mark.parametrize("key", [key for key in SECOND if ELEMENTS[key].vtk])
 @pytest.mark.parametrize("name", ["vtk", "vtk binary", "vtu", "vtu ascii"])
 def test_vtk_writes_elements_whose_nodes_come_in_its_order(name: str, key: str, tmp_path: Path) -> None:
     kind = ELEMENTS[key].vtk

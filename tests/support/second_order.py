@@ -1,4 +1,4 @@
-"""One element of each type of second order, and where its nodes lie between its corners."""
+"""One element of each type of second order."""
 
 from __future__ import annotations
 
@@ -8,15 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.lagrange import kinds
 
-_TRIANGLE, _QUAD, _TETRA, _PYRAMID = "01 12 20", "01 12 23 30", "01 12 20 03 13 23", "01 12 23 30 04 14 24 34"
-_WEDGE, _HEXAHEDRON = "01 12 20 34 45 53 03 14 25", "01 12 23 30 45 56 67 74 04 15 26 37"
-# For each node that is no corner the corners in whose middle it lies, in VTK's order.
-BETWEEN = {
-    "line3": "01", "triangle6": _TRIANGLE, "quad8": _QUAD, "quad9": f"{_QUAD} 0123", "tetra10": _TETRA,
-    "pyramid13": _PYRAMID, "pyramid14": f"{_PYRAMID} 0123", "wedge15": _WEDGE, "wedge18": f"{_WEDGE} 0143 1254 2035",
-    "hexahedron20": _HEXAHEDRON, "hexahedron27": f"{_HEXAHEDRON} 0473 1265 0154 3762 0321 4567 01234567",
-}  # fmt: skip
+SECOND = [key for key in ELEMENTS if key in kinds() and kinds()[key].order == 2]
 _CORNERS: dict[str, list[list[float]]] = {
     "line": [[0, 0], [1, 0]], "triangle": [[0, 0], [1, 0], [0, 1]], "quadrilateral": [[0, 0], [1, 0], [1, 1], [0, 1]],
     "tetrahedron": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -28,7 +22,7 @@ _CORNERS: dict[str, list[list[float]]] = {
 
 def middles(key: str, corners: NDArray[Any]) -> NDArray[Any]:
     """Where the other nodes (..., k, d) of a straight element lie, by its corners (..., c, d)."""
-    return np.stack([corners[..., [int(one) for one in word], :].mean(axis=-2) for word in BETWEEN[key].split()], -2)
+    return np.asarray(np.array(ELEMENTS[key].weights) @ corners)
 
 
 def reference(key: str) -> NDArray[np.float64]:
@@ -36,7 +30,7 @@ def reference(key: str) -> NDArray[np.float64]:
     corners = np.zeros((ELEMENTS[key].shape.corners, 3))
     known = _CORNERS[ELEMENTS[key].shape.name]
     corners[:, : len(known[0])] = known
-    return np.concatenate([corners, middles(key, corners)]) if key in BETWEEN else corners
+    return np.concatenate([corners, middles(key, corners)]) if ELEMENTS[key].weights else corners
 
 
 def element(key: str) -> NDArray[np.float64]:

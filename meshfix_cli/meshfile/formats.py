@@ -354,7 +354,8 @@ OWN = {
     ),
     "comsol": Own(
         "comsol", _comsol, {".mphtxt": "comsol"}, "Comsol",
-        "text, with one mesh; cells of second order are held", "entities; those of the boundary, and selections",
+        "text, with one mesh; prisms and pyramids of second order are held",
+        "entities; those of the boundary, and selections",
     ),
     "gambit": Own(
         "gambit", _gambit, {".neu": "gambit"}, "Gambit",
@@ -366,7 +367,7 @@ OWN = {
     ),
     "elmer": Own(
         "elmer", _by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
-        "a folder with `mesh.header`, or one of its files; cells of second order are held; not what is partitioned",
+        "a folder with `mesh.header`, or one of its files; not what is partitioned",
         "bodies; elements of the boundary; their names in `mesh.names`", beside=True,
     ),
 }  # fmt: skip

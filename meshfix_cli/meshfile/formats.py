@@ -359,7 +359,7 @@ OWN = {
     ),
     "gambit": Own(
         "gambit", _gambit, {".neu": "gambit"}, "Gambit",
-        "neutral files; cells of second order are held", "groups; boundary conditions, whose faces are held",
+        "neutral files; solids of 13, 15 and 20 nodes are held", "groups; boundary conditions, whose faces are held",
     ),
     "fluent": Own(
         "fluent", _fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",

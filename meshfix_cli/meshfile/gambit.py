@@ -1,10 +1,12 @@
 """Gambit's neutral files: sections up to a line ENDOFSECTION, of points, elements, groups and boundary conditions.
 
 A line of a point has its number and its coordinates, an element its number, that of its type, how many points it has,
-and these, on as many lines as they take; points of quadrilaterals go around, those of hexahedra run along the axes. A
-boundary condition names points, or faces of elements by their numbers.
+and these, on as many lines as they take; points of quadrilaterals go around, those of hexahedra run along the axes. So
+do, among them, the further points of elements of second order. A boundary condition names points, or faces of elements
+by their numbers.
 
-Source: Fluent Inc., "GAMBIT Modeling Guide", appendix C, "Neutral file format"; OpenFOAM, "gambitToFoam.L".
+Source: Fluent Inc., "GAMBIT Modeling Guide", appendix C, "Neutral file format"; OpenFOAM, "gambitToFoam.L"; for the
+second order FEMuS, "GambitIO.cpp".
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import numpy as np
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, straight_key
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import (
@@ -43,7 +45,16 @@ _GROUP = re.compile(
 _CONDITION = re.compile(rb"\s*(\S[^\n\r]*?)[ \t]+([01])[ \t]+(\d{1,18})[ \t]+(\d{1,9})(?:[ \t]+-?\d+)*[ \t]*(?=[\n\r])")
 _REF = "gambit:group"
 _TYPES = {1: "line", 2: "quad", 3: "triangle", 4: "hexahedron", 5: "wedge", 6: "tetra", 7: "pyramid"}
-_ORDER = {"hexahedron": [0, 1, 3, 2, 4, 5, 7, 6], "pyramid": [0, 1, 3, 2, 4]}
+# Which of the points stands in each place of the table of elements; of the second order, all types that are known.
+_ORDER = {
+    "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6], "pyramid": [0, 1, 3, 2, 4],
+    "line3": [0, 2, 1], "triangle6": [0, 2, 4, 1, 3, 5], "quad8": [0, 2, 4, 6, 1, 3, 5, 7],
+    "quad9": [0, 2, 4, 6, 1, 3, 5, 7, 8], "tetra10": [0, 2, 5, 9, 1, 4, 3, 6, 7, 8],
+    "wedge18": [0, 2, 5, 12, 14, 17, 1, 4, 3, 13, 16, 15, 6, 8, 11, 7, 10, 9],
+    "hexahedron27": [
+        0, 2, 8, 6, 18, 20, 26, 24, 1, 5, 7, 3, 19, 23, 25, 21, 9, 11, 17, 15, 12, 14, 10, 16, 4, 22, 13,
+    ],
+}  # fmt: skip
 # Which places of the table of elements the faces of an element are, by their numbers from 1.
 _FACES: dict[str, Sequence[Sequence[int]]] = {
     "line": ((0,), (1,)), "triangle": ((0, 1), (1, 2), (2, 0)), "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
@@ -151,7 +162,8 @@ def _add(
         shape, size = _TYPES.get(int(types[here[0]]), ""), int(sizes[here[0]])
         if not shape or size < ELEMENTS[shape].nodes:
             raise ReadError(f"has elements of the type {types[here[0]]} with {size} points, which are not known")
-        key = shape if size == ELEMENTS[shape].nodes else f"{shape}_of_{size}"
+        second = f"{shape}{size}"
+        key = shape if size == ELEMENTS[shape].nodes else second if second in _ORDER else f"{shape}_of_{size}"
         places = first[here][:, None] + 3 + np.array(_ORDER.get(key, range(size)))
         labels, run = np.zeros(len(here), dtype=np.int64), len(runs.cells)
         members = [np.isin(ids[here], listed) for _, _, listed in groups]
@@ -188,7 +200,7 @@ def _add_faces(runs: Runs, elements: Sequence[Cells], name: str, listed: Int64) 
     """Take faces, each with the number of its element, that of its type and its own, for cells."""
     found: dict[int, list[Int64]] = {}
     for cells in elements:
-        faces = _FACES.get(cells.type, ())
+        faces = _FACES.get(straight_key(cells.type) or cells.type, ())  # by their corners
         rows = Numbering(cells.ids).rows_of(listed[:, 0]) if cells.ids is not None else listed[:0, 0]
         for number, face in enumerate(faces, start=1):
             here = rows[(rows >= 0) & (listed[:, 2] == number)]

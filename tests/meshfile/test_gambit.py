@@ -10,11 +10,12 @@ import pytest
 from elements import MESHES
 from files_gambit import FILES, condition, file, group
 from files_medit import material, surface
+from second_order import element, reference
 from shapes import block
 
 from meshfix_cli import read
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, straight_key
 from meshfix_cli.meshfile.gambit import parse
 from meshfix_cli.meshfile.groups import groups_of
 
@@ -89,9 +90,33 @@ def test_faces_are_those_of_the_element(key: str, tmp_path: Path) -> None:
     assert sorted(map(sorted, found)) == sorted(sorted(cell[list(facet)].tolist()) for facet in facets)
 
 
-def test_second_order_is_held(tmp_path: Path) -> None:
-    (tmp_path / "in.neu").write_text(file(POINTS, [*CELLS, (3, [1, 2, 3, 4, 5, 1])]))
-    assert read(tmp_path / "in.neu").not_judged == {"triangle_of_6": 1}
+@pytest.mark.parametrize("key", ["triangle6", "quad8", "quad9", "tetra10", "wedge18", "hexahedron27"])
+def test_points_of_second_order_stand_among_the_corners(key: str) -> None:
+    """Around triangles and quadrilaterals; along the axes of others, first by z, then by y, then by x."""
+    nodes, shape = element(key), ELEMENTS[key].shape
+    rank = np.lexsort(reference(key).T)
+    if shape.dimension == 2:
+        turns = np.arctan2(*(reference(key)[:, :2] - reference(key)[: shape.corners, :2].mean(axis=0)).T[::-1])
+        rank = np.argsort((turns - turns[0]) % (2 * np.pi))
+        rank = np.array([*rank[rank != 8], *rank[rank == 8]])
+    linear = straight_key(key) or ""
+    text = file(nodes[rank][:, : shape.dimension], [(TYPES[linear], [*range(1, len(nodes) + 1)])])
+    (run,) = parse(text.encode()).cells
+    assert run.type == key
+    np.testing.assert_array_equal(rank[run.vertices[0]], np.arange(len(nodes)))
+
+
+def test_faces_of_elements_of_second_order_are_those_of_their_corners() -> None:
+    nodes = element("tetra10")
+    rank = np.lexsort(reference("tetra10").T)
+    skin = condition("skin", True, [[1, 6, 1], [1, 6, 3]])
+    source = parse(file(nodes[rank], [(6, [*range(1, 11)])], [skin]).encode())
+    assert [sorted(rank[row].tolist()) for row in source.cells[1].vertices] == [[0, 1, 2], [1, 2, 3]]
+
+
+def test_second_order_of_which_little_is_known_is_held(tmp_path: Path) -> None:
+    (tmp_path / "in.neu").write_text(file(POINTS, [*CELLS, (3, [1, 2, 3, 4, 5])]))
+    assert read(tmp_path / "in.neu").not_judged == {"triangle_of_5": 1}
 
 
 @pytest.mark.parametrize(

@@ -122,13 +122,13 @@ def test_elements_know_their_cells_and_numbers() -> None:
     """Those of several types in one run, and strips, of which a cell is several elements."""
     hexahedra = np.array([[0, 1, 2, 2, 4, 5, 6, 6], [0, 1, 2, 3, 4, 5, 6, 7], [0, 1, 2, 2, 4, 4, 4, 4]])
     cells = [Cells("triangle", np.array([[0, 1, 2]])), Cells("tetra", np.array([[0, 1, 2, 4]])),
-             Cells("tetra20", np.arange(20)[None]), Cells("hexahedron", hexahedra)]  # fmt: skip
+             Cells("tetra_of_20", np.arange(20)[None]), Cells("hexahedron", hexahedra)]  # fmt: skip
     solved = solved_of(cells)
     assert [part.key for part in solved.parts] == ["tetra", "hexahedron", "tetra", "wedge"]
     numbers = [np.array([7]), np.array([1]), np.array([3]), np.array([30, 31, 32])]
     assert solved.of_elements(numbers).tolist() == [1, 31, 32, 30]
-    assert solved.not_judged() == {"tetra20": 1}
-    assert [run.type for run in solved.rest] == ["triangle", "tetra20"]
+    assert solved.not_judged() == {"tetra_of_20": 1}
+    assert [run.type for run in solved.rest] == ["triangle", "tetra_of_20"]
     assert [(part.key, len(part.vertices)) for part in solved.some(np.array([0, 1, 2]))] == [
         ("tetra", 1), ("hexahedron", 1), ("tetra", 1), ("wedge", 0),
     ]  # fmt: skip

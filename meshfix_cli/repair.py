@@ -208,8 +208,21 @@ class Method:
         from meshfix_cli.solve.untangle import drain
 
         obstacles = find_obstacles(mesh, threads)
+        if mesh.quadratic is not None:
+            return Outcome(*drain(watch(self._curved_steps(mesh, reach, threads, reference))), obstacles)
         run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
         return Outcome(*drain(watch(run)), obstacles)
+
+    def _curved_steps(
+        self, mesh: Mesh, reach: float, threads: int, reference: NDArray[np.float64] | None = None
+    ) -> Steps:
+        """Run what curved elements need, see `quadratic.curved_steps`."""
+        from meshfix_cli.solve.quadratic import RAISED, curved_steps
+
+        floor = 1.0 if self.smooth == "best" else RAISED if self.smooth and not self.only_invalid else None
+        untangling = replace(self, smooth=SMOOTH if self.smooth and not self.only_invalid else 0)
+        straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
+        return curved_steps(mesh, straight, floor=floor, max_move=reach, threads=threads)
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ using namespace nb::literals;
 void bind_mesh(nb::module_& m);
 void bind_measures(nb::module_& m);
 void bind_moves(nb::module_& m);
+void bind_quadratic(nb::module_& m);
 void bind_text(nb::module_& m);
 
 template <class T>

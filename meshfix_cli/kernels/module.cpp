@@ -13,5 +13,6 @@ MODULE(MESHFIX_MODULE, m) {
     meshfix::bind_mesh(m);
     meshfix::bind_measures(m);
     meshfix::bind_moves(m);
+    meshfix::bind_quadratic(m);
     meshfix::bind_text(m);
 }

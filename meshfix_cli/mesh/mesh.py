@@ -12,12 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.elements import SIMPLICES
-from meshfix_cli.mesh.judged import Judged
+from meshfix_cli.mesh.judged import VALID, Judged
 from meshfix_cli.mesh.mixed import build_mixed, checked_blocks
 from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, read_only, refers_outside, rows_of
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
+    from meshfix_cli.mesh.quadratic import Quadratic
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -42,6 +43,8 @@ class Mesh:
         Separate parts have coordinates of their own: that they overlap means nothing.
     freedom : Freedom or None
         Where those of the movable vertices may go that are on the boundary; None: there are none.
+    quadratic : Quadratic or None
+        The elements of second order that are curved; None: each element is the straight one of its corners.
     """
 
     points: NDArray[np.float64]
@@ -49,6 +52,7 @@ class Mesh:
     movable: NDArray[np.bool_]
     apart: bool = False
     freedom: Freedom | None = None
+    quadratic: Quadratic | None = None
 
     @classmethod
     def build(
@@ -155,10 +159,16 @@ class Mesh:
         -------
         inverted : int
         smallest : float
-            The smallest signed area or volume of all corner simplices, in model units.
+            The smallest signed area or volume of all corner simplices, or of all curved elements, in model units.
         """
         inverted, smallest = Judged(self.topology.connectivity).check(self.along_curve(self.points), threads)
-        return len(inverted), smallest
+        if self.quadratic is None:
+            return len(inverted), smallest
+        wrong = np.zeros(self.topology.m, dtype=bool)
+        wrong[self.topology.connectivity.rows[inverted]] = True
+        judgement = self.quadratic.judge(self.points, threads)
+        wrong[self.quadratic.rows] = judgement.verdicts != VALID
+        return int(wrong.sum()), float(judgement.measures.min())
 
     def stuck(self, threads: int = 1) -> NDArray[np.int32]:
         """Return the rows (k,), in the order of the connectivity, of the elements that have no free vertex."""

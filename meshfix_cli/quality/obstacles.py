@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import distinct
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.quadratic import Quadratic
 
 Array = NDArray[np.float64]
 
@@ -84,6 +88,8 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     Obstacles
         Each simplex, and each pair, once and in ascending order: the same for any number of threads.
     """
+    if mesh.quadratic is not None:
+        return _of_curved(mesh, mesh.quadratic)
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     movable = mesh.along_curve(mesh.movable)
     corners = kernels.check(points, connectivity.simplices, threads)[0]
@@ -102,6 +108,19 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         folding,
         np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
     )
+
+
+def _of_curved(mesh: Mesh, quadratic: Quadratic) -> Obstacles:
+    """Return what is proved at corners of curved elements; whether curved facets meet is not looked at.
+
+    Inverted are those whose determinant at a corner no free node changes; they exclude each other where all have a free
+    edge in common, and no tangent of it makes them valid at its end.
+    """
+    free = mesh.movable | quadratic.free
+    proofs = quadratic.kernel.impossible(mesh.points, free.astype(np.uint8))
+    alone, together = (np.sort(quadratic.rows[proofs == mark]).astype(np.int32) for mark in (1, 2))
+    none = np.empty((0, 2), dtype=np.int32)
+    return Obstacles(alone, together, none, none, none[:, 0])
 
 
 def _meeting(

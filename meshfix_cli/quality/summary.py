@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import Block
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.quadratic import Quadratic
 
 Array = NDArray[np.float64]
 BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
@@ -38,6 +42,27 @@ class Jacobians:
     smallest: float
     mean: float
     percentile_1: float
+
+
+@dataclass(frozen=True)
+class Curved:
+    """Elements of second order, where some are curved.
+
+    Attributes
+    ----------
+    count, inverted, inside : int
+        How many there are, how many are not valid, and how many of these are so only between their nodes.
+    smallest : float
+        The smallest Bezier coefficient of a Jacobian determinant, relative to that of the straight element.
+    scaled_jacobian : float
+        The smallest one at the nodes.
+    """
+
+    count: int
+    inverted: int
+    inside: int
+    smallest: float
+    scaled_jacobian: float
 
 
 @dataclass(frozen=True)
@@ -71,6 +96,9 @@ class Summary:
     Where elements are not all simplices, angles are those of triangles, quadrilaterals and tetrahedra, and NaN where
     there are none of these; `jacobians` tells of the scaled Jacobians of all elements, of which `histogram` is then,
     and `kinds` of the elements by their types.
+
+    Where elements are curved, `inverted` and the smallest measure are those of the curved elements, of which `curved`
+    tells more, and all else that of the straight ones of their corners.
     """
 
     elements: int
@@ -87,6 +115,7 @@ class Summary:
     to_reference: tuple[float, float] | None = None
     jacobians: Jacobians | None = None
     kinds: tuple[Kind, ...] = ()
+    curved: Curved | None = None
 
     @property
     def smallest(self) -> float:
@@ -112,6 +141,9 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         `folded` counts interior facets with both simplices on one side; `percentile_1` is that of the elements'
         smallest angles; `histogram` counts those in bins of `BIN_WIDTH` degrees.
     """
+    if mesh.quadratic is not None:
+        straight = summarise(replace(mesh, quadratic=None), metrics, threads, reference)
+        return _with_curved(straight, mesh, mesh.quadratic, threads)
     if not mesh.topology.simplicial:
         return _summarise_elements(mesh, metrics, threads, reference)
     connectivity, bins = mesh.topology.connectivity, BINS[mesh.dimension]
@@ -132,6 +164,24 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         inverted_elements=np.sort(connectivity.rows[inverted]),
         to_reference=None if reference is None else worst_and_mean_to(mesh, reference, threads),
     )
+
+
+def _with_curved(straight: Summary, mesh: Mesh, quadratic: Quadratic, threads: int) -> Summary:
+    """Return the summary of straight elements with the verdicts of the curved ones."""
+    found = quadratic.judge(mesh.points, threads)
+    wrong = np.zeros(mesh.topology.m, dtype=bool)
+    wrong[straight.inverted_elements] = True
+    wrong[quadratic.rows] = found.verdicts != VALID
+    curved = Curved(
+        count=len(quadratic),
+        inverted=int((found.verdicts != VALID).sum()),
+        inside=int((found.verdicts == INSIDE).sum()),
+        smallest=float(found.smallest.min()),
+        scaled_jacobian=float(found.scaled_jacobians.min()),
+    )
+    inverted = np.flatnonzero(wrong).astype(np.int32)
+    least = float(found.measures.min())
+    return replace(straight, inverted=len(inverted), inverted_elements=inverted, min_measure=least, curved=curved)
 
 
 def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, reference: Array | None) -> Summary:
@@ -193,14 +243,21 @@ def _percentile(angles: Array, percent: float, histogram: NDArray[np.int64]) -> 
 def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
     """Return arrays (m,): the signed measure in model units, the smallest angle in degrees, 1 where inverted.
 
-    Where elements are not all simplices, the scaled Jacobian takes the place of the angle.
+    Where elements are not all simplices, the scaled Jacobian takes the place of the angle. Where some are curved, as well
+    the smallest coefficient of the Jacobian determinant, see `Curved`; NaN for others.
     """
     judged = Judged(mesh.topology.connectivity).judge(mesh.along_curve(mesh.points), threads)
     verdicts, measure, quality = (mesh.topology.of_rows(values) for values in judged)
+    curved: dict[str, NDArray[np.generic]] = {}
+    if mesh.quadratic is not None:
+        found, rows = mesh.quadratic.judge(mesh.points, threads), mesh.quadratic.rows
+        verdicts[rows], measure[rows] = found.verdicts, found.measures
+        curved["smallest_coefficient"] = np.full(mesh.topology.m, np.nan)
+        curved["smallest_coefficient"][rows] = found.smallest
     wrong = (verdicts != VALID) | mesh.topology.misnumbered
     simplicial = {"min_angle": np.degrees(quality)} if mesh.topology.simplicial else {}
     other = {} if mesh.topology.simplicial else {"scaled_jacobian": evaluate("scaled_jacobian", mesh)}
-    return {"measure": measure, **simplicial, **other, "inverted": wrong.astype(np.int32)}
+    return {"measure": measure, **simplicial, **other, **curved, "inverted": wrong.astype(np.int32)}
 
 
 def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: int = 1) -> NDArray[np.int64]:

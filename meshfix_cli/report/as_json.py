@@ -90,6 +90,8 @@ def _summary_json(summary: Summary, mesh: Mesh) -> dict[str, Any]:
         values["scaled_jacobian"] = asdict(summary.jacobians)
     if summary.kinds:
         values["types"] = {one.element.key: _kind_json(one) for one in summary.kinds}
+    if summary.curved is not None:
+        values["curved"] = asdict(summary.curved)
     if summary.to_reference is not None:
         values["to_reference"] = dict(zip(("smallest", "mean"), summary.to_reference, strict=True))
     values["metrics"] = {name: _metric_json(name, pair, mesh) for name, pair in summary.metrics.items()}

@@ -248,12 +248,13 @@ def quality_rows(report: Report) -> list[Row]:
     def row(label: str, form: str, value: Callable[[Summary], float]) -> Row:
         return label, [format(value(summary), form) for summary in stages]
 
-    inside = row("of these invalid inside only", ",", lambda one: sum(kind.inside for kind in one.kinds))
+    inside = row("of these invalid inside only", ",", _inside)
     rows = [
         row("inverted elements", ",", lambda one: one.inverted),
         *([inside] if is_some_inside(report) else []),
         row("folded interior edges" if flat else "folded interior faces", ",", lambda one: one.folded),
         row(f"smallest {report.mesh.topology.element.shape.measure}", ".3g", lambda one: one.min_measure),
+        *(_curved(row) if report.result.curved else ()),
         *(_angles(report, row) if report.mesh.topology.simplicial else _jacobians(report, row)),
     ]
     if report.result.to_reference is not None:
@@ -268,8 +269,18 @@ def quality_rows(report: Report) -> list[Row]:
 
 
 def is_some_inside(report: Report) -> bool:
-    """Whether in any stage an element is invalid though all of its corners are valid."""
-    return any(kind.inside for one in report.stages.values() for kind in one.kinds)
+    """Whether in any stage an element is invalid though all of its corners, or nodes, are valid."""
+    return any(map(_inside, report.stages.values()))
+
+
+def _inside(summary: Summary) -> int:
+    return summary.curved.inside if summary.curved else sum(kind.inside for kind in summary.kinds)
+
+
+def _curved(row: Callable[..., Row]) -> Iterator[Row]:
+    """Give the rows that tell how good curved elements are; what follows is of the straight ones of their corners."""
+    yield row("smallest coefficient, straight: 1", ".3f", lambda one: one.curved.smallest)
+    yield row("smallest scaled Jacobian at nodes", ".3f", lambda one: one.curved.scaled_jacobian)
 
 
 def _angles(report: Report, row: Callable[..., Row]) -> Iterator[Row]:
@@ -374,6 +385,7 @@ def _impossible(report: Report) -> Iterator[str]:
     if count := len(found.inverted):
         which = _some(report, found.inverted)
         where = "without" if report.mesh.topology.simplicial else "at corners without"
+        where = "at corners without" if report.mesh.quadratic is not None else where
         yield f"IMPOSSIBLE: {count:,} of them {where} a free vertex: the fixed ones are wrong ({which})"
     if count := len(found.exclusive):  # at least two
         yield (

@@ -1,0 +1,168 @@
+// Bindings of what is known of elements of second order.
+#include <variant>
+
+#include "arrays.hpp"
+#include "quadratic/energy.hpp"
+#include "quadratic/sweep.hpp"
+#include "moves/lbfgs.hpp"
+
+namespace meshfix {
+
+namespace {
+
+void init_mesh(QuadraticMesh* self, const Vector<const std::uint8_t>& codes, const Vector<const std::int32_t>& nodes, std::int64_t n) {
+    new (self) QuadraticMesh(codes.data(), static_cast<std::int64_t>(codes.shape(0)), nodes.data(),
+                          static_cast<std::int64_t>(nodes.shape(0)), n);
+}
+
+auto judge_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
+    QuadraticJudgement found = with_dimension(points.shape(1), [&](auto d) { return judge<d>(self, points.data(), threads); });
+    return std::make_tuple(to_numpy(std::move(found.verdict)), to_numpy(std::move(found.smallest)),
+                           to_numpy(std::move(found.measure)), to_numpy(std::move(found.quality)));
+}
+
+auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
+    std::vector<double> sizes(self.size());
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t e = begin; e < end; ++e) sizes[e] = straight_size<D>(self.type(e), self.local<D>(points.data(), e));
+        });
+    });
+    return to_numpy(std::move(sizes));
+}
+
+// The smallest coefficient of each element, relative to sizes, of those that depend on a free node or of those that do not.
+auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
+                 const Vector<const std::uint8_t>& free, bool of_free, int threads) {
+    std::vector<double> smallest(self.size(), INFINITY);
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t e = begin; e < end; ++e) {
+                const QuadraticParts<D> parts(self.type(e), self.local<D>(points.data(), e));
+                const std::uint32_t here = self.marked(free.data(), e);
+                for (int i = 0; i < parts.type->coefficients; ++i)
+                    if (((parts.type->depends[i] & here) != 0) == of_free)
+                        smallest[e] = std::min(smallest[e], parts.coefficient[i] / sizes.data()[e]);
+            }
+        });
+    });
+    return to_numpy(std::move(smallest));
+}
+
+auto relocate_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
+                 const Vector<const std::uint8_t>& free, const Vector<const std::int32_t>& nodes, const Matrix<const double>& start, double reach,
+                 double goal, bool tied) {
+    std::vector<double> moved(points.data(), points.data() + points.size());
+    const std::int64_t count = with_dimension(points.shape(1), [&](auto d) {
+        QuadraticSweep<d> sweep(self, moved.data(), sizes.data(), free.data(), {start.data(), reach}, goal, tied);
+        return sweep.visit(nodes.data(), static_cast<std::int64_t>(nodes.shape(0)));
+    });
+    return std::make_pair(to_numpy(std::move(moved), points.shape(1)), count);
+}
+
+auto impossible_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const std::uint8_t>& free) {
+    return to_numpy(with_dimension(points.shape(1), [&](auto d) { return QuadraticProofs<d>(self, points.data(), free.data()).find(); }));
+}
+
+template <int D>
+QuadraticNodes<D> nodes_of(const Matrix<const double>& rows) {
+    QuadraticNodes<D> nodes{};
+    for (std::size_t i = 0; i < std::min<std::size_t>(rows.shape(0), MOST_QUADRATIC_NODES); ++i) nodes[i] = load<D>(rows.data() + i * D);
+    return nodes;
+}
+
+auto coefficients_py(const Matrix<const double>& rows, std::uint8_t code) {
+    return to_numpy(with_dimension(rows.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const QuadraticParts<D> parts(quadratic_type(code), nodes_of<D>(rows));
+        return std::vector<double>(parts.coefficient.begin(), parts.coefficient.begin() + parts.type->coefficients);
+    }));
+}
+
+auto columns_py(const Matrix<const double>& rows, std::uint8_t code, const Vector<const double>& shares) {
+    return to_numpy(with_dimension(rows.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        const QuadraticParts<D> parts(quadratic_type(code), nodes_of<D>(rows));
+        std::array<double, MOST_QUADRATIC_NODES> share{};
+        std::copy_n(shares.data(), std::min<std::size_t>(shares.shape(0), MOST_QUADRATIC_NODES), share.begin());
+        std::vector<double> found;
+        for (const Vec<D>& gradient : parts.gradients(share)) found.insert(found.end(), gradient.begin(), gradient.end());
+        found.resize(parts.type->coefficients * D);
+        return found;
+    }), rows.shape(1));
+}
+
+// For each type its dimension, the corners of whose mean each node is in the straight element, and the weight.
+auto shapes_py() {
+    std::vector<std::tuple<int, std::vector<std::vector<int>>, double>> table;
+    for (const QuadraticShape& shape : quadratic_shapes()) table.emplace_back(shape.dimension, shape.between, shape.weight);
+    return table;
+}
+
+struct PyQuadraticEnergy {
+    template <int D>
+    using Minimiser = Lbfgs<QuadraticEnergy<D>>;
+    std::variant<Minimiser<2>, Minimiser<3>> minimiser;
+};
+
+void init_energy(PyQuadraticEnergy* self, const QuadraticMesh& mesh, const Matrix<const double>& points, const Matrix<const double>& rest,
+                 const Vector<const double>& sizes, const Vector<const std::uint8_t>& free, const Matrix<const double>& start, double reach,
+                 int threads) {
+    new (self) PyQuadraticEnergy(with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        QuadraticEnergy<D> energy(mesh, points.data(), rest.data(), sizes.data(), free.data(), {start.data(), reach}, threads);
+        const std::int64_t size = energy.size();
+        return PyQuadraticEnergy{PyQuadraticEnergy::Minimiser<D>(std::move(energy), size, threads)};
+    }));
+}
+
+auto minimise_py(PyQuadraticEnergy& self, double eps, double floor, int iterations) {
+    const nb::gil_scoped_release release;
+    return std::visit([&](auto& lbfgs) {
+        lbfgs.function().goal = {eps, floor};
+        const double before = lbfgs.start(), after = lbfgs.minimise(iterations);
+        return std::make_tuple(before, after, lbfgs.function().smallest());
+    }, self.minimiser);
+}
+
+auto points_py(PyQuadraticEnergy& self, std::size_t dimension) {
+    return std::visit([&](auto& lbfgs) { return to_numpy(std::vector<double>(lbfgs.function().points()), dimension); }, self.minimiser);
+}
+
+// The energy and its gradient at displacements of the free nodes, each in its own unit.
+auto evaluate_py(PyQuadraticEnergy& self, const Vector<const double>& variables, double eps, double floor) {
+    std::vector<double> gradient(variables.shape(0));
+    const double value = std::visit([&](auto& lbfgs) {
+        auto& energy = lbfgs.function();
+        if (static_cast<std::int64_t>(variables.shape(0)) != energy.size()) throw nb::value_error("the variables are of another mesh");
+        energy.goal = {eps, floor};
+        return energy(variables.data(), gradient.data());
+    }, self.minimiser);
+    return std::make_pair(value, to_numpy(std::move(gradient)));
+}
+
+}  // namespace
+
+void bind_quadratic(nb::module_& m) {
+    m.attr("QUADRATIC_SHAPES") = nb::cast(shapes_py());
+    m.def("quadratic_coefficients", &coefficients_py, "nodes"_a.noconvert(), "code"_a);
+    m.def("quadratic_columns", &columns_py, "nodes"_a.noconvert(), "code"_a, "shares"_a.noconvert());
+    nb::class_<QuadraticMesh>(m, "QuadraticMesh")
+        .def("__init__", &init_mesh, "codes"_a.noconvert(), "nodes"_a.noconvert(), "n"_a)
+        .def("judge", &judge_py, "points"_a.noconvert(), "threads"_a)
+        .def("sizes", &sizes_py, "points"_a.noconvert(), "threads"_a)
+        .def("smallest", &smallest_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "of_free"_a, "threads"_a)
+        .def("relocate", &relocate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "nodes"_a.noconvert(),
+             "start"_a.noconvert(), "reach"_a, "goal"_a, "tied"_a)
+        .def("impossible", &impossible_py, "points"_a.noconvert(), "free"_a.noconvert());
+    nb::class_<PyQuadraticEnergy>(m, "QuadraticEnergy")
+        .def("__init__", &init_energy, "mesh"_a, "points"_a.noconvert(), "rest"_a.noconvert(), "sizes"_a.noconvert(),
+             "free"_a.noconvert(), "start"_a.noconvert(), "reach"_a, "threads"_a, nb::keep_alive<1, 2>())
+        .def("minimise", &minimise_py, "eps"_a, "floor"_a, "iterations"_a)
+        .def("evaluate", &evaluate_py, "variables"_a.noconvert(), "eps"_a, "floor"_a)
+        .def("points", &points_py, "dimension"_a);
+}
+
+}  // namespace meshfix

@@ -1,0 +1,152 @@
+"""Elements of second order: which nodes they have, and the passes over all of them that tell which are valid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import ELEMENTS
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+# The types that are judged by the Bezier coefficients of their nodes, in the order of the kernels' numbers for them.
+SECOND_ORDER = tuple(
+    ELEMENTS[key]
+    for key in ("triangle6", "quad8", "quad9", "tetra10", "wedge15", "wedge18", "hexahedron20", "hexahedron27")
+)
+
+
+class Judgement(NamedTuple):
+    """What a pass over all elements tells of each; each (m,).
+
+    Attributes
+    ----------
+    verdicts : uint8
+        `judged.VALID`, INSIDE or CORNER; the last at a node.
+    smallest : float64
+        The smallest Bezier coefficient of the Jacobian determinant, relative to that of the straight element.
+    measures : float64
+        Signed areas or volumes in model units.
+    scaled_jacobians : float64
+        The smallest one at the nodes.
+    """
+
+    verdicts: NDArray[np.uint8]
+    smallest: Array
+    measures: Array
+    scaled_jacobians: Array
+
+
+class Quadratic:
+    """Elements of second order of a mesh, of which some are curved.
+
+    Attributes
+    ----------
+    rows : (m,) int
+        Which elements of the mesh they are.
+    free : (n,) bool
+        The nodes between corners that may move.
+    codes : (m,) uint8
+        Their types, positions in `SECOND_ORDER`.
+    offsets : (m+1,) int64
+        Where the nodes of each begin in `nodes`.
+    nodes : int32
+        Points, in VTK's order, positively oriented.
+    n : int
+        Number of points.
+    kernel : kernels.QuadraticMesh
+    """
+
+    def __init__(
+        self,
+        blocks: Sequence[tuple[str, NDArray[np.integer]]],
+        n: int,
+        rows: NDArray[np.integer] | None = None,
+        free: Mask | None = None,
+    ) -> None:
+        """Take elements by their types, such as ("tetra10", nodes (k, 10)); by default they are all, and all are free."""
+        code = {element.key: i for i, element in enumerate(SECOND_ORDER)}
+        self.codes = np.concatenate([np.full(len(nodes), code[key], dtype=np.uint8) for key, nodes in blocks])
+        self.nodes = np.concatenate([nodes.ravel() for _, nodes in blocks]).astype(np.int32)
+        self.offsets = np.concatenate([[0], np.cumsum(np.array([one.nodes for one in SECOND_ORDER])[self.codes])])
+        self.n = n
+        self.rows = np.arange(len(self.codes)) if rows is None else rows
+        self.free = self.used & ~self.corners if free is None else free
+        self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n)
+
+    def __len__(self) -> int:
+        return len(self.codes)
+
+    def judge(self, points: Array, threads: int) -> Judgement:
+        """Look at all elements at positions (n, d) of all points."""
+        return Judgement(*self.kernel.judge(points, threads))
+
+    @cached_property
+    def between(self) -> list[tuple[NDArray[np.int32], NDArray[np.int32]]]:
+        """The nodes (k,) that are no corners, and the corners (k, c) whose mean each is in a straight element.
+
+        For one number c of corners after the other; a node of several elements once.
+        """
+        found: dict[int, list[tuple[NDArray[np.int32], NDArray[np.int32]]]] = {}
+        for code in np.unique(self.codes).tolist():
+            here, means = self.offsets[:-1][self.codes == code], kernels.QUADRATIC_SHAPES[code][1]
+            for place, corners in enumerate(means):
+                if len(corners) > 1:
+                    ends = self.nodes[here[:, None] + np.array(corners)]
+                    found.setdefault(len(corners), []).append((self.nodes[here + place], ends))
+        groups = []
+        for pairs in found.values():
+            nodes, first = np.unique(np.concatenate([nodes for nodes, _ in pairs]), return_index=True)
+            groups.append((nodes, np.concatenate([ends for _, ends in pairs])[first]))
+        return groups
+
+    @cached_property
+    def corners(self) -> Mask:
+        """(n,) bool: the points that are corners of elements."""
+        mask = self.used.copy()
+        for nodes, _ in self.between:
+            mask[nodes] = False
+        return mask
+
+    @cached_property
+    def used(self) -> Mask:
+        """(n,) bool: the points that are nodes of elements."""
+        mask = np.zeros(self.n, dtype=bool)
+        mask[self.nodes] = True
+        return mask
+
+    def straight(self, points: Array) -> Array:
+        """Return points (n, d) with each node that is no corner where the straight element has it."""
+        found = points.copy()
+        for nodes, ends in self.between:
+            found[nodes] = points[ends].mean(axis=1)
+        return found
+
+    def follow(self, before: Array, after: Array) -> Array:
+        """Return points (n, d) whose corners have moved, with each other node moved by the mean of its corners' ways."""
+        ways = self.straight(after - before)
+        ways[~self.used | self.corners] = 0
+        return after + ways
+
+    def of(self, elements: Mask) -> Mask:
+        """Mark the nodes (n,) of marked elements (m,)."""
+        mask = np.zeros(self.n, dtype=bool)
+        mask[self.nodes[np.repeat(elements, np.diff(self.offsets))]] = True
+        return mask
+
+    def with_one(self, nodes: Mask) -> Mask:
+        """Mark the elements (m,) that have a marked node (n,)."""
+        return np.logical_or.reduceat(nodes[self.nodes], self.offsets[:-1])
+
+    def near(self, elements: Mask, rings: int) -> Mask:
+        """Mark the nodes (n,) of marked elements (m,) and of rings of elements around them."""
+        nodes = self.of(elements)
+        for _ in range(rings):
+            nodes = self.of(self.with_one(nodes))
+        return nodes

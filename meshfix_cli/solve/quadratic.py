@@ -1,0 +1,328 @@
+"""Elements of second order: nodes move until no element is invalid, then the worst are raised.
+
+The linear programme runs on the Bezier coefficients of det J, first of the nodes on edges, faces and inside, then of corners,
+with which the nodes go that lie between them. What it leaves is solved by an energy of all coefficients of a region, minimised
+by L-BFGS; the same energy with a floor raises the smallest coefficients, step by step.
+
+Source: for the linear programme Freitag and Plassmann, as everywhere; for barriers on Bezier coefficients T. Toulorge, C.
+Geuzaine, J.-F. Remacle, J. Lambrechts, "Robust untangling of curvilinear meshes", Journal of Computational Physics 254
+(2013); the form of the barrier is that of `foldover.py`.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.judged import VALID, Judged
+from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
+from meshfix_cli.solve.records import SweepRecord
+from meshfix_cli.solve.strategies import SMOOTHING
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
+
+CYCLES = 6  # of the linear programme
+BARELY = 1e-3  # relative to the straight element: up to there the programme raises coefficients
+RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
+MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
+SHRINK = 0.4  # of eps from one minimisation to the next
+POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far as the second
+STEP, LEAST_STEP = 0.1, 0.02  # of the floor
+RAISING_RINGS = (1, 3)
+RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
+RELAXED = 0.1  # share of the way to the middle by which held nodes give way at a time
+HALVINGS = 5  # that look for a smaller share
+
+PROGRAMMES, ENERGY, RAISING = "LP on coefficients", "energy of coefficients", f"{SMOOTHING} curved elements"
+
+Step = tuple[str, Array]
+Steps = Iterator[tuple["Mesh", SweepRecord]]
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What may move, and how far.
+
+    Attributes
+    ----------
+    free : (n,) bool
+    start : (n, d) float64
+        Where the nodes were.
+    max_move : float
+        How far from there they may go, in model units.
+    threads : int
+        The result has the same bits for any number.
+    """
+
+    free: Mask
+    start: Array
+    max_move: float = math.inf
+    threads: int = 1
+
+
+def steps(mesh: Quadratic, points: Array, limits: Limits, floor: float | None = RAISED) -> Iterator[Step]:
+    """Yield what is done and the points (n, d) after it; the last are never worse than the first.
+
+    Parameters
+    ----------
+    mesh : Quadratic
+    points : (n, d) float64
+    limits : Limits
+    floor : float or None
+        How far coefficients are raised, relative to the straight element, where one is below `POOR`, and in any case if this is
+        1; None: no farther than validity takes.
+    """
+    run = _Run(mesh, points, limits)
+    yield from run.untangle()
+    if floor is not None and run.left == 0 and (floor == 1 or run.smallest < POOR):
+        yield from run.raise_to(floor)
+
+
+class _Run:
+    def __init__(self, mesh: Quadratic, points: Array, limits: Limits) -> None:
+        self.mesh, self.limits, self.points, self.rest = mesh, limits, points, points
+        self.free = limits.free & mesh.used
+        self.sizes = mesh.kernel.sizes(points, limits.threads)
+        self._look()
+
+    def _look(self) -> None:
+        found = self.mesh.judge(self.points, self.limits.threads)
+        self.invalid, self.low = found.verdicts != VALID, found.smallest <= 0
+        self.left, self.smallest = int(self.invalid.sum()), float(found.smallest.min(initial=math.inf))
+
+    def _rank(self) -> tuple[int, float]:
+        return self.left, -self.smallest
+
+    def _try(self, name: str, points: Array) -> Iterator[Step]:
+        """Take points if they are better."""
+        before, rank = (self.points, self.left, self.smallest, self.invalid, self.low), self._rank()
+        self.points = points
+        self._look()
+        if self._rank() < rank:
+            yield name, points
+        else:
+            self.points, self.left, self.smallest, self.invalid, self.low = before
+
+    def untangle(self) -> Iterator[Step]:
+        """Look for valid positions."""
+        yield from self._programmes()
+        for rings in RINGS:
+            if self.left:
+                region = self.free & self.mesh.near(self.low, rings)
+                yield from self._minimise(region)
+
+    def _programmes(self) -> Iterator[Step]:
+        """Sweeps of the linear programme over the nodes of elements that are not certified; the best ones are kept."""
+        corners, points, low = self.mesh.corners, self.points, self.low
+        best = (int(low.sum()), points)
+        for _ in range(CYCLES):
+            if self.left == 0 or not low.any():
+                break
+            near = self.free & self.mesh.of(low)
+            for nodes, tied in ((near & ~corners, False), (near & corners, True)):
+                points = self._relocated(points, nodes, tied)
+            low = self.mesh.judge(points, self.limits.threads).smallest <= 0
+            best = min(best, (int(low.sum()), points), key=lambda one: one[0])
+        if best[1] is not self.points:
+            yield from self._try(PROGRAMMES, best[1])
+
+    def _relocated(self, points: Array, nodes: Mask, tied: bool) -> Array:
+        free, rows = self.free.astype(np.uint8), np.flatnonzero(nodes).astype(np.int32)
+        start, reach = self.limits.start, self.limits.max_move
+        return self.mesh.kernel.relocate(points, self.sizes, free, rows, start, reach, BARELY, tied)[0]
+
+    def _energy(self, region: Mask) -> kernels.QuadraticEnergy:
+        start, reach = self.limits.start, self.limits.max_move
+        return kernels.QuadraticEnergy(
+            self.mesh.kernel, self.points, self.rest, self.sizes, region.astype(np.uint8), start, reach, self.limits.threads
+        )  # fmt: skip
+
+    def _minimise(self, region: Mask) -> Iterator[Step]:
+        if not region.any():
+            return
+        energy, eps = self._energy(region), 1.0
+        for _ in range(MINIMISATIONS):
+            least = energy.minimise(eps, 0.0, ITERATIONS)[2]
+            yield from self._try(ENERGY, energy.points(self.points.shape[1]))
+            if least > 0 or self.left == 0:
+                return
+            eps *= SHRINK
+
+    def raise_to(self, highest: float) -> Iterator[Step]:
+        """Raise the smallest coefficients, those of nodes first; no floor is above what held nodes set."""
+        inner = self.free & ~self.mesh.corners
+        yield from self._raise(inner, highest)
+        if self.smallest < POOR or highest == 1:
+            yield from self._raise(self.free, highest)
+
+    def _raise(self, free: Mask, highest: float) -> Iterator[Step]:
+        step = floor = STEP
+        while floor < highest and step >= LEAST_STEP:
+            self.rest, self.sizes = self.points, self.mesh.kernel.sizes(self.points, self.limits.threads)
+            ceiling = self._smallest(free, of_free=False).min(initial=math.inf)
+            low = self._smallest(free, of_free=True) <= floor
+            if floor >= ceiling:
+                return
+            raised = None if low.any() else self.points
+            for rings in RAISING_RINGS:
+                if raised is None:
+                    raised = self._above(free & self.mesh.near(low, rings), floor)
+            if raised is None:
+                step /= 2
+                floor -= step
+                continue
+            if raised is not self.points:
+                yield from self._try(RAISING, raised)
+                if self.points is not raised:
+                    return
+            floor += step
+
+    def _smallest(self, free: Mask, of_free: bool) -> Array:
+        return self.mesh.kernel.smallest(self.points, self.sizes, free.astype(np.uint8), of_free, self.limits.threads)
+
+    def _above(self, region: Mask, floor: float) -> Array | None:
+        """Return points where all coefficients that depend on a region's nodes are above a floor, if they are found."""
+        if not region.any():
+            return None
+        energy, eps = self._energy(region), RAISING_EPS
+        for _ in range(RAISING_MINIMISATIONS):
+            if energy.minimise(eps, floor, RAISING_ITERATIONS)[2] > floor:
+                return energy.points(self.points.shape[1])
+            eps *= RAISING_SHRINK
+        return None
+
+
+def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array | None:
+    """Return positions where held nodes give way as little as is found to do, and all elements are valid; None: none.
+
+    Each goes straight towards where the straight element has it, by a share of the way.
+
+    Parameters
+    ----------
+    mesh : Quadratic
+    points : (n, d) float64
+        As near to valid as they come with all of them held.
+    limits : Limits
+    held : (n,) bool
+        The nodes, none of them a corner, that may give way.
+    """
+    share = np.zeros(mesh.n)
+    way = mesh.straight(points) - points
+    held = held & ~limits.free & (np.abs(way).max(axis=1) > 0)
+
+    def solved(start: Array, shares: Array) -> tuple[Array, Mask]:
+        moved = start.copy()
+        moved[held] = points[held] + shares[held, None] * way[held]
+        run = _Run(mesh, moved, limits)
+        for _ in run.untangle():
+            pass
+        return run.points, run.invalid
+
+    found, invalid = solved(points, share)
+    while invalid.any():
+        giving = held & mesh.of(invalid) & (share < 1)
+        if not giving.any():
+            return None
+        share[giving] = np.minimum(share[giving] + RELAXED, 1.0)
+        found, invalid = solved(found, share)
+    least, most = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (least + most) / 2
+        trial, invalid = solved(found, middle * share)
+        if invalid.any():
+            least = middle
+        else:
+            most, found = middle, trial
+    return found
+
+
+def curved_steps(
+    mesh: Mesh, straight: Callable[[Mesh], Steps], *, floor: float | None, max_move: float, threads: int
+) -> Steps:
+    """Yield a mesh of curved elements and a record, as it came and after each step; see `untangle.steps`.
+
+    Where corners are tangled, the straight elements are untangled first, and the other nodes go along.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        With its `quadratic` elements.
+    straight : callable
+        Untangles the straight elements.
+    floor : float or None
+        See `steps`.
+    max_move : float
+        No node goes farther from where it was, in model units.
+    threads : int
+    """
+    quadratic = mesh.quadratic
+    assert quadratic is not None
+    clock = _Clock(mesh, threads)
+    yield mesh, clock.record("input", mesh)
+    best, rank = mesh, mesh.check(threads)
+    if _is_tangled(mesh, threads):
+        for moved, record in straight(replace(mesh, quadratic=None)):
+            followed = quadratic.follow(mesh.points, moved.points)
+            best = replace(moved, quadratic=quadratic).with_points(followed)
+            if record.sweep:
+                yield best, replace(record, phase=f"{record.phase}, straight")
+    limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, mesh.points, max_move, threads)
+    candidates = [best] if best is mesh or best.check(threads)[0] < rank[0] else [best, mesh]
+    for start in candidates:
+        for name, points in steps(quadratic, start.points, limits, floor):
+            best = start.with_points(points)
+            yield best, clock.record(name, best)
+        if best.check(threads)[0] == 0:
+            return
+    if best.check(threads)[0] > rank[0]:
+        yield mesh, clock.record("best", mesh)
+
+
+def _is_tangled(mesh: Mesh, threads: int) -> bool:
+    """Whether a straight element is inverted that is invalid as it is curved as well, and has a free corner."""
+    topology, quadratic = mesh.topology, mesh.quadratic
+    assert quadratic is not None
+    wrong = np.zeros(topology.m, dtype=bool)
+    wrong[topology.connectivity.rows[Judged(topology.connectivity).check(mesh.along_curve(mesh.points), threads)[0]]] = True
+    wrong[topology.connectivity.rows[mesh.stuck(threads)]] = False
+    both = np.flatnonzero(quadratic.judge(mesh.points, threads).verdicts != VALID)
+    valid = np.ones(topology.m, dtype=bool)
+    valid[quadratic.rows] = True
+    valid[quadratic.rows[both]] = False
+    return bool((wrong & ~valid).any())
+
+
+def _linear(mesh: Mesh) -> Mask:
+    """Mark the corners (n,) of elements that are not of second order: these stay as the straight elements have them."""
+    mask = np.zeros(mesh.topology.n, dtype=bool)
+    assert mesh.quadratic is not None
+    others = np.ones(mesh.topology.m, dtype=bool)
+    others[mesh.quadratic.rows] = False
+    for block in mesh.topology.blocks:
+        mask[block.vertices[others[block.rows]]] = True
+    return mask
+
+
+class _Clock:
+    """Makes the records of a run."""
+
+    def __init__(self, mesh: Mesh, threads: int) -> None:
+        self.threads, self.points, self.last, self.sweep = threads, mesh.points, "", 0
+        self.time = time.perf_counter()
+
+    def record(self, phase: str, mesh: Mesh) -> SweepRecord:
+        """Return what a step has made of a mesh since the last."""
+        inverted, smallest = mesh.check(self.threads)
+        moved = int((mesh.points != self.points).any(axis=1).sum())
+        self.sweep = 0 if phase in ("input", "best") else self.sweep + 1 if phase == self.last else 1
+        self.points, self.last, now = mesh.points, phase, time.perf_counter()
+        record = SweepRecord(phase, self.sweep, inverted, smallest, moved, now - self.time)
+        self.time = now
+        return record

@@ -1,0 +1,265 @@
+"""Bezier coefficients of elements of second order against det J itself, and what is built upon them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+from monomials import CODES, Array, inside, jacobians, perturbed, positions
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.judged import CORNER, INSIDE, VALID
+
+COUNTS = {
+    "triangle6": 6, "quad8": 16, "quad9": 16, "tetra10": 20, "wedge15": 90, "wedge18": 90, "hexahedron20": 216,
+    "hexahedron27": 216,
+}  # fmt: skip
+every = pytest.mark.parametrize("key", list(CODES))
+ANYWHERE = float("inf")
+
+
+def mesh_of(key: str) -> kernels.QuadraticMesh:
+    count = ELEMENTS[key].nodes
+    return kernels.QuadraticMesh(np.array([CODES[key]], dtype=np.uint8), np.arange(count, dtype=np.int32), count)
+
+
+@every
+def test_the_table_is_that_of_the_elements(key: str) -> None:
+    dimension, between, weight = kernels.QUADRATIC_SHAPES[CODES[key]]
+    element = ELEMENTS[key]
+    assert (dimension, len(between)) == (element.shape.dimension, element.nodes)
+    assert between[: element.shape.corners] == [[i] for i in range(element.shape.corners)]
+    assert weight == pytest.approx(element.shape.weight)
+
+
+@every
+def test_coefficients_bound_the_jacobian_and_have_its_mean(random: np.random.Generator, key: str) -> None:
+    for size in (0.02, 0.1, 0.3):
+        nodes = perturbed(random, key, size)
+        coefficients = kernels.quadratic_coefficients(nodes, CODES[key])
+        values = jacobians(key, nodes, inside(random, key, 500))
+        rounding = 1e-12 * np.abs(coefficients).max()
+        assert len(coefficients) == COUNTS[key]
+        assert coefficients.min() <= values.min() + rounding
+        assert coefficients.max() >= values.max() - rounding
+        corners = jacobians(key, nodes, positions(key)[: ELEMENTS[key].shape.corners])
+        assert np.abs(corners[:, None] - coefficients).min(axis=1).max() < rounding  # they are among them
+
+
+@every
+def test_a_straight_element_has_the_jacobian_of_its_map(random: np.random.Generator, key: str) -> None:
+    d = ELEMENTS[key].shape.dimension
+    linear = np.eye(d) + 0.3 * random.normal(size=(d, d))
+    coefficients = kernels.quadratic_coefficients(positions(key) @ linear.T, CODES[key])
+    np.testing.assert_allclose(coefficients, np.linalg.det(linear), rtol=1e-12)
+    verdict, smallest, measure, quality = mesh_of(key).judge(positions(key) @ linear.T, 1)
+    assert smallest[0] == pytest.approx(np.sign(np.linalg.det(linear)) if np.linalg.det(linear) > 0 else smallest[0])
+    assert (verdict[0] == VALID) == (np.linalg.det(linear) > 0)
+
+
+@every
+def test_measures_are_integrals(random: np.random.Generator, key: str) -> None:
+    nodes = perturbed(random, key, 0.05)
+    unit = {"triangle": 0.5, "quadrilateral": 1.0, "tetrahedron": 1 / 6, "wedge": 0.5, "hexahedron": 1.0}
+    values = jacobians(key, nodes, inside(random, key, 20000))
+    measure = mesh_of(key).judge(nodes, 1)[2][0]
+    error = 6 * values.std() / np.sqrt(len(values)) * unit[ELEMENTS[key].shape.name]
+    assert measure == pytest.approx(values.mean() * unit[ELEMENTS[key].shape.name], abs=error)
+
+
+@every
+def test_coefficients_are_affine_in_nodes_that_move_together(random: np.random.Generator, key: str) -> None:
+    nodes, shares = perturbed(random, key, 0.1), random.random(ELEMENTS[key].nodes)
+    step = random.normal(size=nodes.shape[1])
+    before, after = (kernels.quadratic_coefficients(p, CODES[key]) for p in (nodes, nodes + shares[:, None] * step))
+    columns = kernels.quadratic_columns(nodes, CODES[key], shares)
+    np.testing.assert_allclose(before + columns @ step, after, atol=1e-12 * np.abs(after).max())
+
+
+def doubtful(random: np.random.Generator, key: str, count: int) -> list[Array]:
+    """Return elements about at the limit of being valid."""
+    found = []
+    while len(found) < count:
+        nodes = perturbed(random, key, random.choice([0.03, 0.06, 0.1]))
+        if kernels.quadratic_coefficients(nodes, CODES[key]).min() < 0.2:
+            found.append(nodes)
+    return found
+
+
+def at_the_rim(random: np.random.Generator, key: str, count: int) -> Array:
+    """Return parameters (count, d), most of them near the facets and edges of a type."""
+    if key in ("triangle6", "tetra10"):
+        d = ELEMENTS[key].shape.dimension
+        return random.dirichlet(np.full(d + 1, 0.2), count)[:, :d]
+    at = random.beta(0.2, 0.2, (count, ELEMENTS[key].shape.dimension))
+    if key.startswith("wedge"):
+        at[:, :2] = random.dirichlet(np.full(3, 0.2), count)[:, :2]
+    return at
+
+
+def deepest(random: np.random.Generator, key: str, nodes: Array, at: Array) -> float:
+    """Return about the smallest det J of an element: samples, and then samples on the way to the deepest."""
+    at = np.concatenate([at, at_the_rim(random, key, 1000)])
+    for share in (0.5, 0.25, 0.1, 0.05, 0.02, 0.01):
+        values = jacobians(key, nodes, at)
+        lowest = at[np.argmin(values)]
+        at = np.concatenate([[lowest], lowest + share * (at_the_rim(random, key, 300) - lowest)])
+    return float(jacobians(key, nodes, at).min())
+
+
+@every
+def test_verdicts_against_sampling(random: np.random.Generator, key: str) -> None:
+    seen = set()
+    at = np.concatenate([inside(random, key, 3000), positions(key)])
+    for nodes in doubtful(random, key, 60):
+        verdict = mesh_of(key).judge(nodes, 1)[0][0]
+        seen.add(int(verdict))
+        smallest = deepest(random, key, nodes, at)
+        if smallest <= 0:
+            assert verdict != VALID
+        if verdict == CORNER:
+            assert jacobians(key, nodes, positions(key)).min() <= 1e-12
+        if verdict == INSIDE:  # the samples are near to where it is not positive
+            assert smallest < 1e-3
+    assert seen >= {VALID, CORNER}
+
+
+@every
+def test_what_is_not_a_number_is_not_valid(key: str) -> None:
+    nodes = positions(key)
+    nodes[-1, 0] = np.nan
+    assert mesh_of(key).judge(nodes, 1)[0][0] != VALID
+
+
+@every
+def test_verdicts_do_not_depend_on_where_and_how_large(random: np.random.Generator, key: str) -> None:
+    for nodes in doubtful(random, key, 10):
+        verdict = mesh_of(key).judge(nodes, 1)[0][0]
+        for scale in (2.0**-40, 2.0**30):
+            assert mesh_of(key).judge(scale * nodes, 1)[0][0] == verdict
+
+
+@every
+def test_the_gradient_of_the_energy(random: np.random.Generator, key: str) -> None:
+    mesh, nodes = mesh_of(key), perturbed(random, key, 0.1)
+    rest = perturbed(random, key, 0.02)
+    free = np.ones(len(nodes), dtype=np.uint8)
+    free[[0, -1]] = 0
+    for reach in (ANYWHERE, 0.4):
+        energy = kernels.QuadraticEnergy(mesh, nodes, rest, mesh.sizes(rest, 1), free, nodes + 0.01, reach, 1)
+        at = 0.05 * random.normal(size=(len(nodes) - 2) * nodes.shape[1])
+        _, gradient = energy.evaluate(at, 0.3, 0.1)
+        h = 1e-6
+        steps = h * np.eye(len(at))
+        slopes = [(energy.evaluate(at + s, 0.3, 0.1)[0] - energy.evaluate(at - s, 0.3, 0.1)[0]) / (2 * h) for s in steps]
+        np.testing.assert_allclose(gradient, slopes, atol=1e-6 * np.abs(gradient).max())
+
+
+def test_the_energy_has_the_same_bits_for_any_number_of_threads(random: np.random.Generator) -> None:
+    rows = np.arange(200 * 10, dtype=np.int32).reshape(200, 10)
+    rows[1:, 0] = rows[:-1, 1]  # a chain of elements, each from a node of the one before
+    points = np.concatenate([perturbed(random, "tetra10", 0.05) for _ in rows])
+    mesh = kernels.QuadraticMesh(np.full(200, CODES["tetra10"], dtype=np.uint8), rows.ravel(), len(points))
+    sizes, free = np.ones(200), (random.random(len(points)) < 0.7).astype(np.uint8)
+    found = []
+    for threads in (1, 2, 3):
+        energy = kernels.QuadraticEnergy(mesh, points, points, sizes, free, points, ANYWHERE, threads)
+        found.append((energy.minimise(0.5, 0.0, 20), energy.points(3).tobytes()))
+    assert found[0] == found[1] == found[2]
+
+
+@every
+def test_the_programme_of_a_node_against_highs(random: np.random.Generator, key: str) -> None:
+    """One sweep over one node: the smallest coefficient is that of the best position, as HiGHS finds it."""
+    mesh, node = mesh_of(key), ELEMENTS[key].nodes - 1
+    for nodes in doubtful(random, key, 5):
+        sizes, free = mesh.sizes(nodes, 1), np.ones(len(nodes), dtype=np.uint8)
+        visited = np.array([node], dtype=np.int32)
+        moved, count = mesh.relocate(nodes, sizes, free, visited, nodes, ANYWHERE, 1.0, False)
+        shares = np.zeros(len(nodes))
+        shares[node] = 1
+        columns = kernels.quadratic_columns(nodes, CODES[key], shares) / sizes[0]
+        values = kernels.quadratic_coefficients(nodes, CODES[key]) / sizes[0]
+        depends = np.linalg.norm(columns, axis=1) > 1e-6 * np.linalg.norm(columns, axis=1).max()
+        columns, values = columns[depends], values[depends]
+        d = nodes.shape[1]
+        radius = np.linalg.norm(nodes - nodes[node], axis=1).max()
+        best = linprog(
+            [*np.zeros(d), -1], np.hstack([-columns, np.ones((len(values), 1))]), values,
+            bounds=[*[(-radius, radius)] * d, (None, None)],
+        )  # fmt: skip
+        reached = (kernels.quadratic_coefficients(moved, CODES[key]) / sizes[0])[depends].min()
+        if count:
+            assert reached > values.min()
+        # Ours has a box along axes of its own.
+        inside_of_both = np.linalg.norm(best.x[:d]) < 0.9 * radius and np.linalg.norm(moved[node] - nodes[node]) < 0.9 * radius
+        if inside_of_both and best.x[d] > values.min() + 1e-5:
+            assert reached == pytest.approx(best.x[d], abs=1e-8)
+
+
+@pytest.mark.parametrize("tied", [False, True])
+def test_a_sweep_of_the_programme_stays_in_reach(random: np.random.Generator, tied: bool) -> None:
+    mesh, nodes = mesh_of("tetra10"), perturbed(random, "tetra10", 0.2)
+    free, visited = np.ones(10, dtype=np.uint8), np.arange(4 if tied else 10, dtype=np.int32)
+    moved, count = mesh.relocate(nodes, mesh.sizes(nodes, 1), free, visited, nodes, 0.01, 1.0, tied)
+    assert count
+    assert np.linalg.norm(moved - nodes, axis=1).max() <= 0.01
+
+
+def test_what_no_free_node_changes_is_proved() -> None:
+    """A triangle between two held edges whose tangents have turned past each other at their common corner."""
+    nodes = positions("triangle6")
+    nodes[3], nodes[5] = [0.3, 0.4], [0.4, 0.3]
+    free = np.zeros(6, dtype=np.uint8)
+    free[4] = 1
+    assert mesh_of("triangle6").impossible(nodes, free).tolist() == [1]
+    assert mesh_of("triangle6").impossible(positions("triangle6"), free).tolist() == [0]
+
+
+def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.random.Generator) -> None:
+    """Tetrahedra around one edge whose middle alone is free: proved where HiGHS finds no tangent either."""
+    around = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
+    corners = np.concatenate([[[0, 0, 0], [0, 0, 1]], around + [0, 0, 0.5]])
+    between = kernels.QUADRATIC_SHAPES[CODES["tetra10"]][1]
+    numbers: dict[tuple[int, ...], int] = {}
+    rows = []
+    for k in range(4):
+        tetra = [0, 2 + k, 2 + (k + 1) % 4, 1]
+        ends = [tuple(sorted(tetra[c] for c in mean)) for mean in between]
+        rows.append([one[0] if len(one) == 1 else numbers.setdefault(one, 6 + len(numbers)) for one in ends])
+    straight = np.concatenate([corners, [corners[list(ends)].mean(axis=0) for ends in numbers]])
+    mesh = kernels.QuadraticMesh(np.full(4, CODES["tetra10"], dtype=np.uint8), np.array(rows, dtype=np.int32).ravel(), len(straight))
+    middle = numbers[0, 1]
+    free = np.zeros(len(straight), dtype=np.uint8)
+    free[middle] = 1
+    proved = 0
+    for _ in range(200):
+        points = straight + 0.25 * random.normal(size=straight.shape) * (np.arange(len(straight)) > 5)[:, None]
+        points[middle] = straight[middle]
+        marks = mesh.impossible(points, free)
+        optima = []
+        for end in (0, 3):  # the corners of each that are ends of the edge
+            columns, values = [], []
+            for row in rows:
+                share = (np.array(row) == middle).astype(float)
+                place = points[row]
+                slopes = kernels.quadratic_columns(place, CODES["tetra10"], share)
+                here = np.abs(kernels.quadratic_coefficients(place, CODES["tetra10"])[:, None] - det_at(place, end)).argmin()
+                columns.append(slopes[here])
+                values.append(det_at(place, end))
+            best = linprog(
+                [0, 0, 0, -1], np.hstack([-np.array(columns), np.ones((4, 1))]), values,
+                bounds=[*[(-1e3, 1e3)] * 3, (None, 1)],
+            )  # fmt: skip
+            optima.append(best.x[3])
+        assert (marks == 2).any() <= (min(optima) < 1e-9)  # without a tangent all are 0
+        if not (marks == 1).any():
+            assert (marks == 2).any() == (min(optima) < 1e-9)
+        proved += int((marks == 2).any())
+    assert proved
+
+
+def det_at(nodes: Array, corner: int) -> float:
+    """Return det J of a tetrahedron of second order at a corner."""
+    return float(jacobians("tetra10", nodes, positions("tetra10")[[corner]])[0])

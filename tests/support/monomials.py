@@ -1,0 +1,77 @@
+"""Elements of second order by their spaces of monomials: an oracle that knows nothing of Bezier coefficients."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.quadratic import SECOND_ORDER
+
+Array = NDArray[np.float64]
+CODES = {element.key: code for code, element in enumerate(SECOND_ORDER)}
+_QUAD = [(0, 0), (1, 0), (1, 1), (0, 1)]
+_TRIANGLE = [(0, 0), (1, 0), (0, 1)]
+_CORNERS = {
+    "triangle": _TRIANGLE,
+    "quadrilateral": _QUAD,
+    "tetrahedron": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
+    "wedge": [(*p, z) for z in (0, 1) for p in _TRIANGLE],
+    "hexahedron": [(*p, z) for z in (0, 1) for p in _QUAD],
+}
+
+
+def _belongs(key: str, e: tuple[int, ...]) -> bool:
+    """Whether a monomial of these exponents, none above 2, is in the space of a type."""
+    if key in ("triangle6", "tetra10"):
+        return sum(e) <= 2
+    if key in ("wedge15", "wedge18"):
+        return e[0] + e[1] <= 2 and not (key == "wedge15" and e[0] + e[1] == 2 and e[2] == 2)
+    return key in ("quad9", "hexahedron27") or e.count(2) <= 1  # serendipity
+
+
+def exponents(key: str) -> list[tuple[int, ...]]:
+    """Return the exponents of the monomials that span the space of a type."""
+    d = SECOND_ORDER[CODES[key]].shape.dimension
+    return [e for e in product(range(3), repeat=d) if _belongs(key, e)]
+
+
+def positions(key: str) -> Array:
+    """Return the nodes (k, d) of the straight element at the corners of the parameters."""
+    corners = np.array(_CORNERS[SECOND_ORDER[CODES[key]].shape.name], dtype=float)
+    return np.array([corners[mean].mean(axis=0) for mean in kernels.QUADRATIC_SHAPES[CODES[key]][1]])
+
+
+def inside(random: np.random.Generator, key: str, count: int) -> Array:
+    """Return parameters (count, d) inside a type."""
+    d = SECOND_ORDER[CODES[key]].shape.dimension
+    at = random.random((4 * count + 40, d)) if "triangle" not in key else random.random((4 * count + 40, 2))
+    if key == "tetra10":
+        at = random.dirichlet(np.ones(4), len(at))[:, :3]
+    if key in ("triangle6", "wedge15", "wedge18"):
+        at[:, :2] = random.dirichlet(np.ones(3), len(at))[:, :2]
+    return at[:count]
+
+
+def jacobians(key: str, nodes: Array, at: Array) -> Array:
+    """Return det J (k,) of an element with nodes (n, d) at parameters (k, d)."""
+    powers = exponents(key)
+    basis = np.stack([np.prod(positions(key) ** np.array(e), axis=1) for e in powers], axis=1)
+    weights = np.linalg.solve(basis, nodes)  # of the monomials
+    columns = []
+    for axis in range(at.shape[1]):
+        slopes = []
+        for e in powers:
+            lower = np.array(e)
+            lower[axis] = max(lower[axis] - 1, 0)
+            slopes.append(e[axis] * np.prod(at**lower, axis=1))
+        columns.append(np.stack(slopes, axis=1) @ weights)
+    return np.asarray(np.linalg.det(np.stack(columns, axis=1)))
+
+
+def perturbed(random: np.random.Generator, key: str, size: float) -> Array:
+    """Return the nodes of an element, each moved by a random step."""
+    nodes = positions(key)
+    return nodes + size * random.normal(size=nodes.shape)

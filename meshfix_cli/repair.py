@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
 
 Sliding = Literal["none", "flat", "curved"]
+Curving = Literal["hold", "relax"]
+CURVINGS: tuple[Curving, ...] = get_args(Curving)
 SLIDES: tuple[Sliding, ...] = get_args(Sliding)  # the later, the more vertices move
 NEAR_CEILING = 0.9  # of it: from there on it is what limits the smallest angle or scaled Jacobian
 MAX_DEVIATION = Distance(0.03, in_h=True)
@@ -144,7 +146,8 @@ class Method:
     """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `strategies.plan`.
 
     `slide` and `slide_interfaces` tell which vertices of the boundary and of interfaces move as well, where that does
-    not change the shape, or, with "curved", by little; see `curved.Smooth` for the last two.
+    not change the shape, or, with "curved", by little; see `curved.Smooth` for the next two. With `curving` "relax"
+    curved edges of the boundary become straighter where elements cannot be valid otherwise.
     """
 
     strategy: str = "auto"
@@ -157,6 +160,7 @@ class Method:
     slide_interfaces: bool = True
     feature_angle: float = 40.0
     max_deviation: Distance = MAX_DEVIATION
+    curving: Curving = "hold"
 
     def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
         """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
@@ -222,7 +226,8 @@ class Method:
         floor = 1.0 if self.smooth == "best" else RAISED if self.smooth and not self.only_invalid else None
         untangling = replace(self, smooth=SMOOTH if self.smooth and not self.only_invalid else 0)
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
-        return curved_steps(mesh, straight, floor=floor, max_move=reach, threads=threads)
+        relax = self.curving == "relax"
+        return curved_steps(mesh, straight, floor=floor, relax=relax, max_move=reach, threads=threads)
 
 
 @dataclass(frozen=True)
@@ -371,9 +376,12 @@ def repair(
     document, outcome, slid = _solved(document, method, partial(solve, reference=reference), reach, reference)
     meshes = outcome.after, outcome.untangled, outcome.before
     after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
-    result, written = files.write(document, after, output, put)
+    # Processes write what they hold: not the nodes between corners.
+    result, written = files.write(document, after, output, put if document.ties is None else None)
     asked = method.smooth and not method.only_invalid and reference is None
     notes = (*slid, *_what_happened(document, bool(asked), outcome, after, rounded), *written)
+    if result.quadratic is not None:
+        notes += _of_boundary(document.mesh, result, method.curving, reach, threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
     facts: dict[str, Any] = {"strategy": method.strategy, "displacement": displacement(outcome.before, result)}
     if outcome.ranks:
@@ -407,6 +415,29 @@ def _solved(
             inverted = counted(left.inverted, "element", "elements")
             notes = (f"--slide {method.slide} would leave {inverted} inverted, so that --slide {slide} is taken",)
     return freed, outcome, notes
+
+
+def _of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, threads: int) -> tuple[str, ...]:
+    """Say how far curved edges of the boundary gave way, or would have to."""
+    import numpy as np
+
+    from meshfix_cli.solve.quadratic import giving_way
+
+    assert after.quadratic is not None
+    ways = np.linalg.norm(after.points - before.points, axis=1)[after.quadratic.giving]
+    if (ways > 0).any():
+        count = counted(int((ways > 0).sum()), "curved node of the boundary", "curved nodes of the boundary")
+        return (
+            f"--curving relax moved {count} by at most {ways.max():.3g} ({ways.max() / before.mean_edge_length():.2g}h)",
+        )
+    found = giving_way(after, reach, threads) if curving == "hold" and after.check(threads)[0] else None
+    if found is None:
+        return ()
+    many = counted(found[0], "curved node of the boundary", "curved nodes of the boundary")
+    share = found[1] / before.mean_edge_length()
+    return (
+        f"--curving relax would move {many} by at most {found[1]:.3g} ({share:.2g}h), and all elements are valid then",
+    )
 
 
 def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from meshfix_cli.cli.files import given
 from meshfix_cli.cli.names import CELLS, FILE, PAGE, PLOT
 from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
-from meshfix_cli.repair import MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
+from meshfix_cli.repair import CURVINGS, MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
@@ -319,6 +319,14 @@ solving = packed(
         default=True,
         show_default=True,
         help="Whether vertices between regions slide as well.",
+    ),
+    click.option(
+        "--curving",
+        type=click.Choice(CURVINGS),
+        default="hold",
+        show_default=True,
+        help="Elements of second order: whether curved edges of the boundary become straighter, by as little as is found "
+        "to do, where elements cannot be valid otherwise.",
     ),
 )
 drawing = packed(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 from typing import NamedTuple
 
@@ -52,6 +53,8 @@ class Quadratic:
         Which elements of the mesh they are.
     free : (n,) bool
         The nodes between corners that may move.
+    giving : (n,) bool
+        Those that are held for no other reason than that they are on the boundary.
     codes : (m,) uint8
         Their types, positions in `SECOND_ORDER`.
     offsets : (m+1,) int64
@@ -68,17 +71,24 @@ class Quadratic:
         blocks: Sequence[tuple[str, NDArray[np.integer]]],
         n: int,
         rows: NDArray[np.integer] | None = None,
-        free: Mask | None = None,
     ) -> None:
-        """Take elements by their types, such as ("tetra10", nodes (k, 10)); by default they are all, and all are free."""
+        """Take elements by their types, such as ("tetra10", nodes (k, 10)); by default they are all of the mesh."""
         code = {element.key: i for i, element in enumerate(SECOND_ORDER)}
         self.codes = np.concatenate([np.full(len(nodes), code[key], dtype=np.uint8) for key, nodes in blocks])
         self.nodes = np.concatenate([nodes.ravel() for _, nodes in blocks]).astype(np.int32)
         self.offsets = np.concatenate([[0], np.cumsum(np.array([one.nodes for one in SECOND_ORDER])[self.codes])])
         self.n = n
         self.rows = np.arange(len(self.codes)) if rows is None else rows
-        self.free = self.used & ~self.corners if free is None else free
+        self.free = self.used & ~self.corners
+        self.giving = np.zeros(n, dtype=bool)
         self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n)
+
+    def holding(self, held: Mask, giving: Mask) -> Quadratic:
+        """Return the same elements with nodes held, both (n,) bool; see `giving`."""
+        other = copy(self)
+        other.free = self.free & ~held
+        other.giving = self.free & held & giving
+        return other
 
     def __len__(self) -> int:
         return len(self.codes)

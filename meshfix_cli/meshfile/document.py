@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
-from meshfix_cli.mesh.elements import counted, dimension_of, words
+from meshfix_cli.mesh.elements import counted, dimension_of
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import first_of_each_place
@@ -103,6 +103,12 @@ class Document:
         return self.solved.some(self.mesh.topology.source)
 
     @property
+    def _used(self) -> NDArray[np.bool_]:
+        """(n,) bool: the points that are moved by themselves."""
+        quadratic, used = self.mesh.quadratic, self.mesh.topology.used
+        return used if quadratic is None else used | quadratic.used
+
+    @property
     def higher_order(self) -> dict[str, int]:
         """Number of elements of each type that has more nodes than corners."""
         counts: dict[str, int] = {}
@@ -126,7 +132,7 @@ class Document:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
         original = self.source.points
         points: NDArray[np.floating[Any]] = original.copy()
-        moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & mesh.topology.used
+        moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & self._used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
                 np.copyto(points, mesh.points, casting="same_kind", where=moved[:, None])
@@ -139,7 +145,7 @@ class Document:
         if self.copies is not None:
             behind = np.flatnonzero(moved[self.copies] & ~mesh.topology.used)
             points[behind] = points[self.copies[behind]]
-        if self.ties is not None:
+        if self.ties is not None and mesh.quadratic is None:
             followed = self.ties.follow(points, moved)
             if not self.source.exact:
                 points[followed] = self.source.rounded(points[followed])
@@ -253,12 +259,19 @@ def build(
         between.append(_region_codes(labels, solved, topology))
         holds[f"{BETWEEN} {key}"] = topology.interface(between[-1])
     ties, curved = solved.ties(source.points)
-    if curved.any():
-        raise _curved(solved, curved)
     if copies is not None:
         held = {reason: _of_copies(mask, copies) for reason, mask in held.items()}
     if ties is not None:
         held[HALFWAY] = ties.nodes & topology.used
+    if ties is not None and curved.any():
+        from meshfix_cli.meshfile.curving import quadratic_of
+
+        parts = solved.some(topology.source)
+        asked = np.logical_or.reduce([mask for reason, mask in held.items() if reason != ON_CELLS])
+        masks = asked, held[ON_CELLS]
+        quadratic = quadratic_of(parts, curved[topology.source], mesh, ties, between, *masks)
+        mesh = replace(mesh, quadratic=quadratic)
+    elif ties is not None:
         held = {reason: ties.with_corners(mask) for reason, mask in held.items()}
     holds |= held
     for mask in holds.values():
@@ -306,17 +319,6 @@ def _solved(source: Source) -> Solved:
     solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
     raise ReadError(f"there are no linear solid elements and no plane mesh of linear elements in it (cells: {found})")
-
-
-def _curved(solved: Solved, curved: NDArray[np.bool_]) -> ReadError:
-    """Return the complaint about elements, marked (m,), whose nodes are not all where straight elements have them."""
-    kinds = [part.type for part in solved.some(np.flatnonzero(curved)) if len(part.vertices)]
-    named = listed([words(kind)[1] for kind in dict.fromkeys(kinds)])
-    count = int(curved.sum())
-    return ReadError(
-        f"{count:,} of {counted(solved.m, 'element', 'elements')} {'is' if count == 1 else 'are'} curved ({named}): "
-        "elements of second order are solved where their other nodes lie in the middle between corners"
-    )
 
 
 def _ids(source: Source) -> list[NDArray[np.int64]]:

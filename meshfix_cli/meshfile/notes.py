@@ -17,6 +17,8 @@ from meshfix_cli.meshfile.solved import Solved
 if TYPE_CHECKING:
     from meshfix_cli.mesh.ties import Ties
 
+_CURVED = "elements are curved, and are judged so; angles, and their ceiling, are those of the straight ones"
+
 
 def notes_on(
     mesh: Mesh, solved: Solved, seen_from_above: bool, copies: NDArray[np.int64] | None, ties: Ties | None
@@ -50,7 +52,8 @@ def notes_on(
     between = 0 if ties is None else int((ties.nodes & ~topology.used).sum())
     if between:
         follow = counted(between, "node lies between corners and follows", "nodes lie between corners and follow")
-        notes.append(f"no element is curved: {follow} them")
+        curved = mesh.quadratic is not None
+        notes.append(_CURVED if curved else f"no element is curved: {follow} them")
     isolated = topology.n - int(topology.used.sum()) - between - (together - places if copies is not None else 0)
     if isolated:
         notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
@@ -64,7 +67,7 @@ def notes_on(
     if which:
         kept = "solved so, and the numbering is kept; --fix-orientation would turn it"
         notes.append(f"{which} numbered the other way round (mirrored): {kept}")
-    if not mesh.movable.any():
+    if not (mesh.movable.any() or (mesh.quadratic is not None and mesh.quadratic.free.any())):
         notes.append("no vertex is free to move")
     return tuple(notes)
 

@@ -294,7 +294,8 @@ def distances(before: Mesh, after: Mesh) -> Array:
     """
     with np.errstate(invalid="ignore"):  # of points that are of no element
         first, *others = (along * along for along in (after.points - before.points).T)
-        return np.where(before.topology.used, np.sqrt(sum(others, first)), 0.0)
+        used = before.topology.used if before.quadratic is None else before.topology.used | before.quadratic.used
+        return np.where(used, np.sqrt(sum(others, first)), 0.0)
 
 
 def displacement(before: Mesh, after: Mesh) -> dict[str, float]:

@@ -37,7 +37,8 @@ class Distance:
 def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple[Mesh, int]:
     """Move some interior vertices by a distance in random directions.
 
-    Those of the boundary that slide move in their lines and planes, and on their curves and surfaces. From the seed
+    Those of the boundary that slide move in their lines and planes, and on their curves and surfaces; nodes between
+    corners go along with these. From the seed
     come one permutation of the free vertices and one direction for every vertex; so in a series of percentages or
     distances the same vertices move in the same directions.
 
@@ -73,6 +74,8 @@ def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple
     chosen = order[: round(percent / 100 * int(mesh.topology.used.sum()))]
     points = mesh.points.copy()
     points[chosen] += distance * directions[chosen]
+    if mesh.quadratic is not None:
+        points = mesh.quadratic.follow(mesh.points, points)
     moved = mesh.with_points(points)
     if mesh.freedom is not None:
         there = mesh.freedom.onto(mesh.along_curve(points), start)

@@ -41,6 +41,7 @@ RELAXED = 0.1  # share of the way to the middle by which held nodes give way at 
 HALVINGS = 5  # that look for a smaller share
 
 PROGRAMMES, ENERGY, RAISING = "LP on coefficients", "energy of coefficients", f"{SMOOTHING} curved elements"
+RELAXING = "curved boundary gives way"
 
 Step = tuple[str, Array]
 Steps = Iterator[tuple["Mesh", SweepRecord]]
@@ -244,7 +245,7 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
 
 
 def curved_steps(
-    mesh: Mesh, straight: Callable[[Mesh], Steps], *, floor: float | None, max_move: float, threads: int
+    mesh: Mesh, straight: Callable[[Mesh], Steps], *, floor: float | None, relax: bool, max_move: float, threads: int
 ) -> Steps:
     """Yield a mesh of curved elements and a record, as it came and after each step; see `untangle.steps`.
 
@@ -258,6 +259,8 @@ def curved_steps(
         Untangles the straight elements.
     floor : float or None
         See `steps`.
+    relax : bool
+        Let held nodes of the boundary give way where nothing else helps, see `relaxed`.
     max_move : float
         No node goes farther from where it was, in model units.
     threads : int
@@ -272,7 +275,7 @@ def curved_steps(
             followed = quadratic.follow(mesh.points, moved.points)
             best = replace(moved, quadratic=quadratic).with_points(followed)
             if record.sweep:
-                yield best, replace(record, phase=f"{record.phase}, straight")
+                yield best, replace(record, phase=f"straight elements, {record.phase}")
     limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, mesh.points, max_move, threads)
     candidates = [best] if best is mesh or best.check(threads)[0] < rank[0] else [best, mesh]
     for start in candidates:
@@ -281,8 +284,36 @@ def curved_steps(
             yield best, clock.record(name, best)
         if best.check(threads)[0] == 0:
             return
+    if relax:
+        given = relaxed(quadratic, best.points, limits, quadratic.giving)
+        if given is not None:
+            best = best.with_points(given)
+            yield best, clock.record(RELAXING, best)
+            for name, points in steps(quadratic, given, limits, floor):
+                best = best.with_points(points)
+                yield best, clock.record(name, best)
     if best.check(threads)[0] > rank[0]:
         yield mesh, clock.record("best", mesh)
+
+
+def giving_way(mesh: Mesh, max_move: float, threads: int) -> tuple[int, float] | None:
+    """Return how many nodes of the boundary would give way, and the farthest by how much, see `relaxed`; None: it is no use.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        As near to valid as it comes.
+    max_move : float
+    threads : int
+    """
+    quadratic = mesh.quadratic
+    assert quadratic is not None
+    limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, mesh.points, max_move, threads)
+    found = relaxed(quadratic, mesh.points, limits, quadratic.giving)
+    if found is None:
+        return None
+    ways = np.linalg.norm(found - mesh.points, axis=1)[quadratic.giving]
+    return int((ways > 0).sum()), float(ways.max(initial=0.0))
 
 
 def _is_tangled(mesh: Mesh, threads: int) -> bool:
@@ -290,7 +321,9 @@ def _is_tangled(mesh: Mesh, threads: int) -> bool:
     topology, quadratic = mesh.topology, mesh.quadratic
     assert quadratic is not None
     wrong = np.zeros(topology.m, dtype=bool)
-    wrong[topology.connectivity.rows[Judged(topology.connectivity).check(mesh.along_curve(mesh.points), threads)[0]]] = True
+    wrong[
+        topology.connectivity.rows[Judged(topology.connectivity).check(mesh.along_curve(mesh.points), threads)[0]]
+    ] = True
     wrong[topology.connectivity.rows[mesh.stuck(threads)]] = False
     both = np.flatnonzero(quadratic.judge(mesh.points, threads).verdicts != VALID)
     valid = np.ones(topology.m, dtype=bool)

@@ -152,7 +152,9 @@ def test_the_gradient_of_the_energy(random: np.random.Generator, key: str) -> No
         _, gradient = energy.evaluate(at, 0.3, 0.1)
         h = 1e-6
         steps = h * np.eye(len(at))
-        slopes = [(energy.evaluate(at + s, 0.3, 0.1)[0] - energy.evaluate(at - s, 0.3, 0.1)[0]) / (2 * h) for s in steps]
+        slopes = [
+            (energy.evaluate(at + s, 0.3, 0.1)[0] - energy.evaluate(at - s, 0.3, 0.1)[0]) / (2 * h) for s in steps
+        ]
         np.testing.assert_allclose(gradient, slopes, atol=1e-6 * np.abs(gradient).max())
 
 
@@ -193,7 +195,9 @@ def test_the_programme_of_a_node_against_highs(random: np.random.Generator, key:
         if count:
             assert reached > values.min()
         # Ours has a box along axes of its own.
-        inside_of_both = np.linalg.norm(best.x[:d]) < 0.9 * radius and np.linalg.norm(moved[node] - nodes[node]) < 0.9 * radius
+        inside_of_both = (
+            np.linalg.norm(best.x[:d]) < 0.9 * radius and np.linalg.norm(moved[node] - nodes[node]) < 0.9 * radius
+        )
         if inside_of_both and best.x[d] > values.min() + 1e-5:
             assert reached == pytest.approx(best.x[d], abs=1e-8)
 
@@ -229,7 +233,9 @@ def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.ra
         ends = [tuple(sorted(tetra[c] for c in mean)) for mean in between]
         rows.append([one[0] if len(one) == 1 else numbers.setdefault(one, 6 + len(numbers)) for one in ends])
     straight = np.concatenate([corners, [corners[list(ends)].mean(axis=0) for ends in numbers]])
-    mesh = kernels.QuadraticMesh(np.full(4, CODES["tetra10"], dtype=np.uint8), np.array(rows, dtype=np.int32).ravel(), len(straight))
+    mesh = kernels.QuadraticMesh(
+        np.full(4, CODES["tetra10"], dtype=np.uint8), np.array(rows, dtype=np.int32).ravel(), len(straight)
+    )
     middle = numbers[0, 1]
     free = np.zeros(len(straight), dtype=np.uint8)
     free[middle] = 1
@@ -245,7 +251,9 @@ def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.ra
                 share = (np.array(row) == middle).astype(float)
                 place = points[row]
                 slopes = kernels.quadratic_columns(place, CODES["tetra10"], share)
-                here = np.abs(kernels.quadratic_coefficients(place, CODES["tetra10"])[:, None] - det_at(place, end)).argmin()
+                here = np.abs(
+                    kernels.quadratic_coefficients(place, CODES["tetra10"])[:, None] - det_at(place, end)
+                ).argmin()
                 columns.append(slopes[here])
                 values.append(det_at(place, end))
             best = linprog(

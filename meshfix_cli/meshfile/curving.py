@@ -1,0 +1,116 @@
+"""The elements of a file that are curved: which of their nodes may move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import ReadError, listed
+from meshfix_cli.mesh.elements import counted, words
+from meshfix_cli.mesh.quadratic import SECOND_ORDER, Quadratic
+from meshfix_cli.meshfile.solved import Part
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
+    from meshfix_cli.mesh.ties import Ties
+
+Mask = NDArray[np.bool_]
+Int32 = NDArray[np.int32]
+
+
+def quadratic_of(
+    parts: Sequence[Part],
+    curved: Mask,
+    mesh: Mesh,
+    ties: Ties,
+    regions: Iterable[NDArray[np.int64]],
+    held: Mask,
+    on_cells: Mask,
+) -> Quadratic:
+    """Return the elements of second order of a mesh of which some are curved.
+
+    Nodes on facets of the boundary and between regions stay, and so do those that are held.
+
+    Parameters
+    ----------
+    parts : sequence of Part
+        The elements of the mesh, see `Document.parts`.
+    curved : (m,) bool
+    mesh : Mesh
+    ties : Ties
+        Which node lies between which corners.
+    regions : iterable of (m,) int64
+    held, on_cells : (n,) bool
+        For other reasons, and on other cells of the file, such as those of the boundary.
+
+    Raises
+    ------
+    ReadError
+        An element is curved that is of no type that is judged so.
+    """
+    _check(parts, curved)
+    blocks, rows, start = [], [], 0
+    other = held.copy()
+    for part in parts:
+        here = np.arange(start, start + len(part.vertices))
+        start += len(part.vertices)
+        if not _is_judged(part):
+            other[part.vertices if part.nodes is None else part.nodes] = True
+            continue
+        assert part.refined is not None
+        assert part.nodes is not None
+        nodes = np.where(mesh.topology.flipped[here, None], part.nodes[:, part.refined.mirrored], part.nodes)
+        blocks.append((part.refined.key, nodes))
+        rows.append(here)
+    boundary = _on_facets(mesh, ties, [None])
+    between = _on_facets(mesh, ties, regions)
+    quadratic = Quadratic(blocks, mesh.topology.n, np.concatenate(rows))
+    return quadratic.holding(boundary | between | on_cells | other, boundary & ~other)
+
+
+def _is_judged(part: Part) -> bool:
+    return part.refined is not None and part.refined in SECOND_ORDER and part.type == part.refined.key
+
+
+def _check(parts: Sequence[Part], curved: Mask) -> None:
+    """Refuse curved elements of types that are not judged."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)]).tolist()
+    counts = {part.type: 0 for part in parts if not _is_judged(part)}
+    for part, begin, end in zip(parts, starts, starts[1:], strict=False):
+        if part.type in counts:
+            counts[part.type] += int(curved[begin:end].sum())
+    named = listed([counted(count, *words(kind)) for kind, count in counts.items() if count])
+    if named:
+        raise ReadError(f"{named} of {counted(len(curved), 'element', 'elements')} are curved, which are not judged")
+
+
+def _on_facets(mesh: Mesh, ties: Ties, regions: Iterable[NDArray[np.int64] | None]) -> Mask:
+    """Mark the nodes (n,) that lie between corners of facets of the boundary or of regions."""
+    mask = np.zeros(mesh.topology.n, dtype=bool)
+    for labels in regions:
+        facets = mesh.topology.facets_between(labels)[0]
+        facets = np.where(facets < 0, -1, mesh.topology.connectivity.vertices[facets])
+        if facets.shape[1] == 2:
+            mask[_found(ties, facets)] = True
+            continue
+        for size in {3, facets.shape[1]}:
+            some = facets[(facets >= 0).sum(axis=1) == size][:, :size]
+            for k in range(size):
+                mask[_found(ties, some[:, [k, (k + 1) % size]])] = True
+            mask[_found(ties, some)] = True
+    return mask
+
+
+def _found(ties: Ties, corners: Int32) -> Int32:
+    """Return the nodes (k,) that lie between all of some corners (f, w)."""
+    nodes = [np.empty(0, dtype=np.int32)]
+    for tie in ties.groups:
+        if tie.corners.shape[1] != corners.shape[1] or not len(corners):
+            continue
+        both = np.concatenate([np.sort(corners, axis=1), tie.corners])
+        number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
+        nodes.append(tie.nodes[np.isin(number[len(corners) :], number[: len(corners)])])
+    return np.concatenate(nodes)

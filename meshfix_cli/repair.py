@@ -211,9 +211,10 @@ class Method:
         from meshfix_cli.solve.records import Outcome
         from meshfix_cli.solve.untangle import drain
 
+        if mesh.quadratic is not None:  # what is impossible may change, as its boundary may
+            found = drain(watch(self._curved_steps(mesh, reach, threads, reference)))
+            return Outcome(*found, find_obstacles(found[2], threads))
         obstacles = find_obstacles(mesh, threads)
-        if mesh.quadratic is not None:
-            return Outcome(*drain(watch(self._curved_steps(mesh, reach, threads, reference))), obstacles)
         run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
         return Outcome(*drain(watch(run)), obstacles)
 
@@ -427,17 +428,14 @@ def _of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, thre
     ways = np.linalg.norm(after.points - before.points, axis=1)[after.quadratic.giving]
     if (ways > 0).any():
         count = counted(int((ways > 0).sum()), "curved node of the boundary", "curved nodes of the boundary")
-        return (
-            f"--curving relax moved {count} by at most {ways.max():.3g} ({ways.max() / before.mean_edge_length():.2g}h)",
-        )
+        far = f"{ways.max():.3g} ({ways.max() / before.mean_edge_length():.2g}h)"
+        return (f"--curving relax moved {count} by at most {far}",)
     found = giving_way(after, reach, threads) if curving == "hold" and after.check(threads)[0] else None
     if found is None:
         return ()
     many = counted(found[0], "curved node of the boundary", "curved nodes of the boundary")
-    share = found[1] / before.mean_edge_length()
-    return (
-        f"--curving relax would move {many} by at most {found[1]:.3g} ({share:.2g}h), and all elements are valid then",
-    )
+    far = f"{found[1]:.3g} ({found[1] / before.mean_edge_length():.2g}h)"
+    return (f"--curving relax would move {many} by at most {far}, and all elements are valid then",)
 
 
 def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:

@@ -479,8 +479,8 @@ def shortest(values: Float64, single: bool, longest: int) -> tuple[bytes, Int64]
 def replace(data: bytes, first: int, last: int, spans: Int64, words: bytes, word_spans: Int64) -> bytes:
     """The data between two offsets, with each span (k, 2), in their order, replaced by a span of `words`."""
 
-# For each type of `mesh.quadratic.SECOND_ORDER` its dimension, the corners whose mean each node is in the straight element,
-# and the weight of scaled Jacobians.
+# For each type of `mesh.quadratic.SECOND_ORDER` its dimension, the corners whose mean each node is in the straight
+# element, and the weight of scaled Jacobians.
 QUADRATIC_SHAPES: list[tuple[int, list[list[int]], float]]
 
 def quadratic_coefficients(nodes: Float64, code: int) -> Float64:

@@ -139,7 +139,7 @@ class Quadratic:
         return found
 
     def follow(self, before: Array, after: Array) -> Array:
-        """Return points (n, d) whose corners have moved, with each other node moved by the mean of its corners' ways."""
+        """Return points (n, d) whose corners have moved, with other nodes moved by the mean of their corners' ways."""
         ways = self.straight(after - before)
         ways[~self.used | self.corners] = 0
         return after + ways

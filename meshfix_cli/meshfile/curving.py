@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.ties import Ties
 
 Mask = NDArray[np.bool_]
-Int32 = NDArray[np.int32]
 
 
 def quadratic_of(
@@ -104,9 +103,9 @@ def _on_facets(mesh: Mesh, ties: Ties, regions: Iterable[NDArray[np.int64] | Non
     return mask
 
 
-def _found(ties: Ties, corners: Int32) -> Int32:
+def _found(ties: Ties, corners: NDArray[np.integer]) -> NDArray[np.integer]:
     """Return the nodes (k,) that lie between all of some corners (f, w)."""
-    nodes = [np.empty(0, dtype=np.int32)]
+    nodes: list[NDArray[np.integer]] = [np.empty(0, dtype=np.int32)]
     for tie in ties.groups:
         if tie.corners.shape[1] != corners.shape[1] or not len(corners):
             continue

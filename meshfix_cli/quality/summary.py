@@ -243,8 +243,8 @@ def _percentile(angles: Array, percent: float, histogram: NDArray[np.int64]) -> 
 def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
     """Return arrays (m,): the signed measure in model units, the smallest angle in degrees, 1 where inverted.
 
-    Where elements are not all simplices, the scaled Jacobian takes the place of the angle. Where some are curved, as well
-    the smallest coefficient of the Jacobian determinant, see `Curved`; NaN for others.
+    Where elements are not all simplices, the scaled Jacobian takes the place of the angle. Where some are curved, there
+    is the smallest coefficient of the Jacobian determinant as well, see `Curved`; NaN for others.
     """
     judged = Judged(mesh.topology.connectivity).judge(mesh.along_curve(mesh.points), threads)
     verdicts, measure, quality = (mesh.topology.of_rows(values) for values in judged)

@@ -1,12 +1,12 @@
 """Elements of second order: nodes move until no element is invalid, then the worst are raised.
 
-The linear programme runs on the Bezier coefficients of det J, first of the nodes on edges, faces and inside, then of corners,
-with which the nodes go that lie between them. What it leaves is solved by an energy of all coefficients of a region, minimised
-by L-BFGS; the same energy with a floor raises the smallest coefficients, step by step.
+The linear programme runs on the Bezier coefficients of det J, first of the nodes on edges, faces and inside, then of
+corners, with which the nodes go that lie between them. What it leaves is solved by an energy of all coefficients of a
+region, minimised by L-BFGS; the same energy with a floor raises the smallest coefficients, step by step.
 
-Source: for the linear programme Freitag and Plassmann, as everywhere; for barriers on Bezier coefficients T. Toulorge, C.
-Geuzaine, J.-F. Remacle, J. Lambrechts, "Robust untangling of curvilinear meshes", Journal of Computational Physics 254
-(2013); the form of the barrier is that of `foldover.py`.
+Source: for the linear programme Freitag and Plassmann, as everywhere; for barriers on Bezier coefficients T. Toulorge,
+C. Geuzaine, J.-F. Remacle, J. Lambrechts, "Robust untangling of curvilinear meshes", Journal of Computational Physics
+254 (2013); the form of the barrier is that of `foldover.py`.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ def steps(mesh: Quadratic, points: Array, limits: Limits, floor: float | None = 
     points : (n, d) float64
     limits : Limits
     floor : float or None
-        How far coefficients are raised, relative to the straight element, where one is below `POOR`, and in any case if this is
-        1; None: no farther than validity takes.
+        How far coefficients are raised, relative to the straight element, where one is below `POOR`, and in any case if
+        this is 1; None: no farther than validity takes.
     """
     run = _Run(mesh, points, limits)
     yield from run.untangle()
@@ -140,10 +140,11 @@ class _Run:
         return self.mesh.kernel.relocate(points, self.sizes, free, rows, start, reach, BARELY, tied)[0]
 
     def _energy(self, region: Mask) -> kernels.QuadraticEnergy:
-        start, reach = self.limits.start, self.limits.max_move
+        limits, free = self.limits, region.astype(np.uint8)
+        reach = limits.start, limits.max_move
         return kernels.QuadraticEnergy(
-            self.mesh.kernel, self.points, self.rest, self.sizes, region.astype(np.uint8), start, reach, self.limits.threads
-        )  # fmt: skip
+            self.mesh.kernel, self.points, self.rest, self.sizes, free, *reach, limits.threads
+        )
 
     def _minimise(self, region: Mask) -> Iterator[Step]:
         if not region.any():
@@ -297,7 +298,9 @@ def curved_steps(
 
 
 def giving_way(mesh: Mesh, max_move: float, threads: int) -> tuple[int, float] | None:
-    """Return how many nodes of the boundary would give way, and the farthest by how much, see `relaxed`; None: it is no use.
+    """Return how many nodes of the boundary would give way, and by how much at most; None: that is no use.
+
+    See `relaxed`.
 
     Parameters
     ----------

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 from monomials import CODES, Array, inside, jacobians, perturbed, positions
+from scipy.optimize import linprog
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import ELEMENTS
@@ -53,7 +53,7 @@ def test_a_straight_element_has_the_jacobian_of_its_map(random: np.random.Genera
     linear = np.eye(d) + 0.3 * random.normal(size=(d, d))
     coefficients = kernels.quadratic_coefficients(positions(key) @ linear.T, CODES[key])
     np.testing.assert_allclose(coefficients, np.linalg.det(linear), rtol=1e-12)
-    verdict, smallest, measure, quality = mesh_of(key).judge(positions(key) @ linear.T, 1)
+    verdict, smallest, *_ = mesh_of(key).judge(positions(key) @ linear.T, 1)
     assert smallest[0] == pytest.approx(np.sign(np.linalg.det(linear)) if np.linalg.det(linear) > 0 else smallest[0])
     assert (verdict[0] == VALID) == (np.linalg.det(linear) > 0)
 
@@ -79,7 +79,7 @@ def test_coefficients_are_affine_in_nodes_that_move_together(random: np.random.G
 
 def doubtful(random: np.random.Generator, key: str, count: int) -> list[Array]:
     """Return elements about at the limit of being valid."""
-    found = []
+    found: list[Array] = []
     while len(found) < count:
         nodes = perturbed(random, key, random.choice([0.03, 0.06, 0.1]))
         if kernels.quadratic_coefficients(nodes, CODES[key]).min() < 0.2:
@@ -224,7 +224,7 @@ def test_what_no_free_node_changes_is_proved() -> None:
 def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.random.Generator) -> None:
     """Tetrahedra around one edge whose middle alone is free: proved where HiGHS finds no tangent either."""
     around = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
-    corners = np.concatenate([[[0, 0, 0], [0, 0, 1]], around + [0, 0, 0.5]])
+    corners = np.concatenate([[[0, 0, 0], [0, 0, 1]], [*around, 0, 0, 0.5]])
     between = kernels.QUADRATIC_SHAPES[CODES["tetra10"]][1]
     numbers: dict[tuple[int, ...], int] = {}
     rows = []

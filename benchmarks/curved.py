@@ -1,0 +1,107 @@
+"""Elements of second order against gmsh's optimisers with the boundary held: `python benchmarks/curved.py [MESH ...]`.
+
+Both get the same mesh in one run: coarse ones that gmsh makes around what is round, or files that it reads. Of each
+result: invalid elements, the smallest coefficient of a Jacobian determinant relative to the straight element, by
+meshfix's own judge, and CPU seconds of the algorithm alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import gmsh
+from curved_bodies import made
+from rich.console import Console
+from rich.table import Table
+
+from meshfix_cli import read
+from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.meshfile.document import Document
+from meshfix_cli.repair import Method
+from meshfix_cli.solve.quadratic import giving_way
+
+OPTIMISERS = {"HighOrder": "HighOrder", "Elastic": "HighOrderElastic", "FastCurving": "HighOrderFastCurving"}
+
+
+def figures(document: Document) -> tuple[int, float]:
+    """Return how many elements are invalid, and the smallest coefficient."""
+    mesh = document.mesh
+    assert mesh.quadratic is not None
+    found = mesh.quadratic.judge(mesh.points, 1)
+    return int((found.verdicts != VALID).sum()), float(found.smallest.min())
+
+
+def timed(action: Callable[[], Any]) -> tuple[Any, float]:
+    """Return what an action gives, and its CPU seconds."""
+    start = time.process_time()
+    return action(), time.process_time() - start
+
+
+def repaired(document: Document, smooth: Any = "auto") -> tuple[int, float, float, str]:
+    """Run meshfix; return the figures, CPU seconds and what it proves or offers."""
+    outcome, seconds = timed(lambda: Method(smooth=smooth).solve(document.mesh, math.inf, 1))
+    left, smallest = figures(replace(document, mesh=outcome.after))
+    note = ""
+    if left:
+        proved = len(outcome.obstacles.inverted) + len(outcome.obstacles.exclusive)
+        way = giving_way(outcome.after, math.inf, 1)
+        note = f"{proved} proved; relax " + (
+            "none" if way is None else f"{way[1] / document.mesh.mean_edge_length():.3f}h"
+        )
+    return left, smallest, seconds, note
+
+
+def optimised(path: Path, method: str) -> tuple[int, float, float]:
+    """Run an optimiser of gmsh; return the figures and CPU seconds."""
+    gmsh.clear()
+    gmsh.open(str(path))
+    gmsh.option.setNumber("Mesh.HighOrderFixBoundaryNodes", 1)
+    _, seconds = timed(lambda: gmsh.model.mesh.optimize(method))
+    target = path.with_suffix(f".{method}.msh")
+    gmsh.write(str(target))
+    return (*figures(read(target)), seconds)
+
+
+def cases(names: list[str], folder: Path) -> Iterator[tuple[str, Path]]:
+    """Give names and files: those that are given, or made ones."""
+    if names:
+        yield from ((Path(name).name, Path(name)) for name in names)
+        return
+    for name in made(gmsh):
+        path = folder / "mesh.msh"
+        gmsh.write(str(path))
+        yield name, path
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("meshes", nargs="*", metavar="MESH")
+    table = Table("mesh", "elements", "as it is", "meshfix", "best", *OPTIMISERS, "left")
+    gmsh.initialize(readConfigFiles=False, interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    gmsh.option.setNumber("General.NumThreads", 1)
+    with tempfile.TemporaryDirectory() as folder:
+        for name, path in cases(parser.parse_args().meshes, Path(folder)):
+            document = read(path)
+            if document.mesh.quadratic is None:
+                continue
+            ours, best = repaired(document), repaired(document, "best")
+            others = [optimised(path, method) for method in OPTIMISERS.values()]
+            cells = [
+                "{} {:.3f}".format(*figures(document)),
+                *(f"{one[0]} {one[1]:.3f} {one[2]:.2f} s" for one in (ours, best, *others)),
+            ]
+            table.add_row(name, str(document.mesh.topology.m), *cells, ours[3])
+    Console(width=200).print(table)
+
+
+if __name__ == "__main__":
+    main()

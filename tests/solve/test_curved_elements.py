@@ -1,0 +1,177 @@
+"""Curved elements: repaired, raised, proved impossible, and what is promised of all runs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from geometries import grid
+from numpy.typing import NDArray
+from refined import COMPLETE, SERENDIPITY, refined
+
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.quadratic import Array, Quadratic
+from meshfix_cli.quality.summary import summarise
+from meshfix_cli.repair import Method
+from meshfix_cli.solve.quadratic import POOR, Limits, relaxed, steps
+
+SQUARE = np.linspace(0, 1, 4)
+FAMILIES = {
+    "triangle6": ("triangle", SERENDIPITY), "quad8": ("quad", SERENDIPITY), "quad9": ("quad", COMPLETE),
+    "tetra10": ("tetra", SERENDIPITY), "wedge15": ("wedge", SERENDIPITY), "wedge18": ("wedge", COMPLETE),
+    "hexahedron20": ("hexahedron", SERENDIPITY), "hexahedron27": ("hexahedron", COMPLETE),
+}  # fmt: skip
+every = pytest.mark.parametrize("key", list(FAMILIES))
+
+
+def straight(key: str) -> tuple[Array, NDArray[np.int32]]:
+    """A grid of elements of second order."""
+    kind, types = FAMILIES[key]
+    axes = (SQUARE,) * ELEMENTS[kind].shape.dimension
+    points, rows = _grid(kind, axes)
+    points, blocks = refined(points, [(kind, rows)], types)
+    return points, blocks[0][1]
+
+
+def _grid(kind: str, axes: tuple[Array, ...]) -> tuple[Array, NDArray[np.int32]]:
+    if kind in ("triangle", "tetra"):
+        return grid(*axes)
+    shape = tuple(map(len, axes))
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    first = np.stack(np.meshgrid(*(np.arange(n - 1) for n in shape), indexing="ij"), axis=-1).reshape(-1, len(axes))
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1)] if len(axes) == 2 else [
+        (*base, z) for z in (0, 1) for base in ((0, 0), (1, 0), (1, 1), (0, 1))
+    ]  # fmt: skip
+    rows = np.stack([np.ravel_multi_index(tuple((first + c).T), shape) for c in corners], axis=1).astype(np.int32)
+    if kind == "wedge":
+        rows = np.concatenate([rows[:, [0, 1, 2, 4, 5, 6]], rows[:, [0, 2, 3, 4, 6, 7]]])
+    return points, rows
+
+
+def curved(key: str, size: float = 0.25, seed: int = 0) -> tuple[Quadratic, Array, NDArray[np.bool_]]:
+    """The grid with nodes inside that are moved at random, and some of them too far; which are free."""
+    points, rows = straight(key)
+    quadratic = Quadratic([(key, rows)], len(points))
+    inside = np.asarray(((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1))
+    moved = inside & ~quadratic.corners
+    random = np.random.default_rng(seed)
+    points = points + size / 3 * random.uniform(-1, 1, points.shape) * moved[:, None]
+    return quadratic, points, inside
+
+
+def repaired(quadratic: Quadratic, points: Array, limits: Limits, floor: float | None = 0.5) -> Array:
+    found = [moved for _, moved in steps(quadratic, points, limits, floor)]
+    return found[-1] if found else points
+
+
+@every
+def test_elements_become_valid_and_better(key: str) -> None:
+    quadratic, points, free = curved(key, 0.8)
+    before = quadratic.judge(points, 1)
+    after = quadratic.judge(repaired(quadratic, points, Limits(free, points)), 1)
+    assert (before.verdicts != VALID).any()
+    assert (after.verdicts == VALID).all()
+    assert after.smallest.min() > POOR
+
+
+@every
+def test_held_nodes_keep_their_bits_and_threads_make_no_difference(key: str) -> None:
+    quadratic, points, free = curved(key, 0.8)
+    found = [repaired(quadratic, points, Limits(free, points, threads=threads)) for threads in (1, 2, 3)]
+    assert found[0].tobytes() == found[1].tobytes() == found[2].tobytes()
+    assert found[0][~free].tobytes() == points[~free].tobytes()
+
+
+def test_no_node_goes_farther_than_it_may() -> None:
+    quadratic, points, free = curved("tetra10", 0.8)
+    for reach in (0.02, 0.1):
+        moved = repaired(quadratic, points, Limits(free, points, reach))
+        assert 0 < np.linalg.norm(moved - points, axis=1).max() <= reach
+        assert (quadratic.judge(moved, 1).verdicts != VALID).sum() < (
+            quadratic.judge(points, 1).verdicts != VALID
+        ).sum()
+
+
+def test_what_is_well_is_left_alone() -> None:
+    quadratic, points, free = curved("hexahedron20", 0.1)
+    assert quadratic.judge(points, 1).smallest.min() > POOR
+    assert list(steps(quadratic, points, Limits(free, points))) == []
+
+
+def test_the_result_turns_with_the_mesh() -> None:
+    """The same elements are valid, with the same smallest coefficient, wherever the axes lie."""
+    quadratic, points, free = curved("triangle6", 0.8)
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    one = quadratic.judge(repaired(quadratic, points, Limits(free, points)), 1).smallest.min()
+    other = quadratic.judge(repaired(quadratic, points @ turn, Limits(free, points @ turn)), 1).smallest.min()
+    assert one > POOR
+    assert other > POOR
+
+
+def bulging() -> tuple[Quadratic, Array, NDArray[np.bool_]]:
+    """A square whose left edge bulges into it by more than its elements are wide."""
+    points, rows = straight("triangle6")
+    quadratic = Quadratic([("triangle6", rows)], len(points))
+    inside = np.asarray(((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1))
+    left = (points[:, 0] < 1e-9) & ~quadratic.corners
+    points = points.copy()
+    points[left, 0] = 0.9
+    return quadratic, points, inside
+
+
+def test_the_boundary_gives_way_by_little() -> None:
+    quadratic, points, free = bulging()
+    limits = Limits(free, points)
+    held = repaired(quadratic, points, limits)
+    assert (quadratic.judge(held, 1).verdicts != VALID).any()
+    found = relaxed(quadratic, held, limits, ~free & ~quadratic.corners)
+    assert found is not None
+    assert (quadratic.judge(found, 1).verdicts == VALID).all()
+    ways = points[~free] - found[~free]
+    assert 0 < ways[:, 0].max() < 0.9  # not as far as the straight edge
+    assert (ways >= 0).all()
+    assert not ways[:, 1].any()
+
+
+def mesh_of(quadratic: Quadratic, points: Array, rows: NDArray[np.int32], free: NDArray[np.bool_]) -> Mesh:
+    mesh = Mesh.build(points, [("triangle", rows[:, :3])])
+    return replace(mesh, quadratic=quadratic.holding(~free, ~free & ~quadratic.corners))
+
+
+def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
+    """At the corner of a square one element alone lies between two edges, which turn past each other."""
+    points, rows = straight("triangle6")
+    quadratic, points, free = curved("triangle6", 0.2)
+    alone = next(v for v in range(len(points)) if (rows[:, :3] == v).sum() == 1)
+    element, place = np.argwhere(rows[:, :3] == alone)[0]
+    one, other = rows[element, [3 + place, 3 + (place + 2) % 3]]
+    ways = points[[one, other]] - points[alone]
+    points[[one, other]] += 1.2 * ways[::-1]
+    mesh = mesh_of(quadratic, points, rows, free)
+    outcome = Method().solve(mesh, math.inf, 1)
+    assert outcome.obstacles.inverted.tolist() == [element]
+    assert outcome.records[-1].inverted == 1
+    relaxing = Method(curving="relax").solve(mesh, math.inf, 1)
+    assert relaxing.valid
+    curved_ones = summarise(relaxing.after).curved
+    assert curved_ones is not None
+    assert curved_ones.smallest > 0
+
+
+def test_tangled_corners_are_mended_first_and_nodes_go_along() -> None:
+    points, rows = straight("triangle6")
+    quadratic, points, free = curved("triangle6", 0.2)
+    random = np.random.default_rng(3)
+    corners = free & quadratic.corners
+    tangled = points + 0.5 * random.uniform(-1, 1, points.shape) * corners[:, None]
+    tangled = quadratic.follow(points, tangled)
+    mesh = mesh_of(quadratic, tangled, rows, free)
+    before, outcome = mesh.check()[0], Method().solve(mesh, math.inf, 1)
+    assert before
+    assert outcome.valid
+    assert any(record.phase.startswith("straight elements") for record in outcome.records)
+    assert outcome.after.points[~free].tobytes() == tangled[~free].tobytes()

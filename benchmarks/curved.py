@@ -22,6 +22,7 @@ from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli import read
+from meshfix_cli.errors import MeshfixError
 from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.repair import Method
@@ -33,7 +34,8 @@ OPTIMISERS = {"HighOrder": "HighOrder", "Elastic": "HighOrderElastic", "FastCurv
 def figures(document: Document) -> tuple[int, float]:
     """Return how many elements are invalid, and the smallest coefficient."""
     mesh = document.mesh
-    assert mesh.quadratic is not None
+    if mesh.quadratic is None:  # straight
+        return mesh.check()[0], 1.0
     found = mesh.quadratic.judge(mesh.points, 1)
     return int((found.verdicts != VALID).sum()), float(found.smallest.min())
 
@@ -66,7 +68,10 @@ def optimised(path: Path, method: str) -> tuple[int, float, float]:
     _, seconds = timed(lambda: gmsh.model.mesh.optimize(method))
     target = path.with_suffix(f".{method}.msh")
     gmsh.write(str(target))
-    return (*figures(read(target)), seconds)
+    try:
+        return (*figures(read(target)), seconds)
+    except MeshfixError:  # corners as well are where no mesh is any more
+        return -1, math.nan, seconds
 
 
 def cases(names: list[str], folder: Path) -> Iterator[tuple[str, Path]]:

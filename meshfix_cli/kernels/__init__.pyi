@@ -5,6 +5,12 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.kernels._quadratic import QUADRATIC_SHAPES as QUADRATIC_SHAPES
+from meshfix_cli.kernels._quadratic import QuadraticEnergy as QuadraticEnergy
+from meshfix_cli.kernels._quadratic import QuadraticMesh as QuadraticMesh
+from meshfix_cli.kernels._quadratic import quadratic_coefficients as quadratic_coefficients
+from meshfix_cli.kernels._quadratic import quadratic_columns as quadratic_columns
+
 Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]
 Int64 = NDArray[np.int64]
@@ -478,67 +484,3 @@ def shortest(values: Float64, single: bool, longest: int) -> tuple[bytes, Int64]
 
 def replace(data: bytes, first: int, last: int, spans: Int64, words: bytes, word_spans: Int64) -> bytes:
     """The data between two offsets, with each span (k, 2), in their order, replaced by a span of `words`."""
-
-# For each type of `mesh.quadratic.SECOND_ORDER` its dimension, the corners whose mean each node is in the straight
-# element, and the weight of scaled Jacobians.
-QUADRATIC_SHAPES: list[tuple[int, list[list[int]], float]]
-
-def quadratic_coefficients(nodes: Float64, code: int) -> Float64:
-    """Bezier coefficients of det J of an element of second order (nodes, d)."""
-
-def quadratic_columns(nodes: Float64, code: int, shares: Float64) -> Float64:
-    """Gradients (k, d) of these by x, where each node moves by its share of x; they are affine in it."""
-
-class QuadraticMesh:
-    """Elements of second order; see quadratic/mesh.hpp."""
-
-    def __init__(self, codes: Uint8, nodes: Int32, n: int) -> None:
-        """Take the types (m,), the nodes, one element behind the other, and the number of points."""
-    def judge(self, points: Float64, threads: int) -> tuple[Uint8, Float64, Float64, Float64]:
-        """Verdicts, smallest relative coefficients, measures and scaled Jacobians, each (m,)."""
-    def sizes(self, points: Float64, threads: int) -> Float64:
-        """det J (m,) of the straight elements, in the mean, which coefficients are compared with."""
-    def smallest(self, points: Float64, sizes: Float64, free: Uint8, of_free: bool, threads: int) -> Float64:
-        """The smallest coefficient (m,) relative to sizes, of those that depend on a free node, or of the others."""
-    def relocate(
-        self,
-        points: Float64,
-        sizes: Float64,
-        free: Uint8,
-        nodes: Int32,
-        start: Float64,
-        reach: float,
-        goal: float,
-        tied: bool,
-    ) -> tuple[Float64, int]:
-        """One sweep of the linear programme over nodes (k,): the points (n, d) after it, and how many nodes moved.
-
-        It visits those that have a coefficient below the goal; `tied`: nodes between go along with them.
-        """
-    def impossible(self, points: Float64, free: Uint8) -> Uint8:
-        """Mark elements (m,) that cannot be valid while fixed nodes stay: 1 by themselves, 2 together with others."""
-
-class QuadraticEnergy:
-    """Minimises the energy of quadratic/energy.hpp over the free nodes, for one goal after the other."""
-
-    def __init__(
-        self,
-        mesh: QuadraticMesh,
-        points: Float64,
-        rest: Float64,
-        sizes: Float64,
-        free: Uint8,
-        start: Float64,
-        reach: float,
-        threads: int,
-    ) -> None:
-        """Take positions (n, d), those whose corners make the straight elements at rest, and det J of these (m,)."""
-    def minimise(self, eps: float, floor: float, iterations: int) -> tuple[float, float, float]:
-        """Go on from where the last one ended, until all coefficients are above the floor.
-
-        Returns the energy before and after, and the smallest coefficient, relative to the sizes.
-        """
-    def evaluate(self, variables: Float64, eps: float, floor: float) -> tuple[float, Float64]:
-        """Return the value and its gradient at steps of the free nodes, each in its own unit."""
-    def points(self, dimension: int) -> Float64:
-        """Return the points (n, d)."""

@@ -33,6 +33,7 @@ ROOMS: dict[str, set[str]] = {
     "errors": set(),
 }
 KERNEL_ROOMS: dict[str, set[str]] = {
+    "quadratic": {"moves", "measures", "mesh", "common"},
     "moves": {"measures", "mesh", "common"},
     "measures": {"mesh", "common"},
     "mesh": {"common"},

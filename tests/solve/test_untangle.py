@@ -25,7 +25,8 @@ from meshfix_cli.quality.summary import ceiling, displacement, summarise
 from meshfix_cli.report.as_json import history_csv
 from meshfix_cli.solve.foldover import MINIMISATIONS, QUICK, REGION_PATIENCE, THOROUGH, Reach, minimisations
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.run import GAIN, NEAR
+from meshfix_cli.solve.positions import GAIN
+from meshfix_cli.solve.run import NEAR
 from meshfix_cli.solve.strategies import SMOOTHING, STRATEGIES, SWEEPS, plan
 from meshfix_cli.solve.untangle import steps
 

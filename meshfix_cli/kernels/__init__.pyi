@@ -19,6 +19,7 @@ Float64 = NDArray[np.float64]
 Uint8 = NDArray[np.uint8]
 
 BUILD: str  # what processors these are for
+DONE: int
 DUE: int
 SHAPES: list[
     tuple[int, int, list[list[int]], list[list[int]], list[int], float]
@@ -209,6 +210,9 @@ def summarise(
     Last comes the largest angle. Angles are in radians, as is the width of the bins.
     """
 
+def below(points: Float64, simplices: Int32, least: float, threads: int) -> Int32:
+    """Return the simplices, ascending, of which the smallest sine^2 is below some value; also those not valid."""
+
 def min_sine2(points: Float64, simplices: Int32, threads: int) -> float:
     """Return the smallest sine^2 of the valid simplices; 1: there are none."""
 
@@ -247,7 +251,8 @@ def relocate(
 ) -> tuple[int, int]:
     """Relocate, in place, the vertices that are due, of some blocks of one colour; the numbers visited and moved.
 
-    States (n,): 0 for a vertex that is held, DUE, or 1 when it has been visited and neither it nor a neighbour moved.
+    States (n,): 0 for a vertex that is held, DUE, or DONE when it has been visited and neither it nor a neighbour has
+    moved.
 
     The threshold is that of the active-set method, or the floor of MEAN_RATIO. Smoothing makes no
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.

@@ -20,6 +20,7 @@ from meshfix_cli.mesh.topology import rows_of_part
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Numbers = NDArray[np.int32]
+Places = NDArray[np.integer]
 
 
 @dataclass(frozen=True)
@@ -58,9 +59,9 @@ class Shapes:
     directions : (s,) uint8
         2: a surface; 1: a curve.
     offsets : (k+1,) int32
-    around : (r, 3) int32
+    around : (r, 4) int32
         Of each vertex that slides, at its offset: the other end of an edge and -1, or the other corners of a triangle,
-        and their shape.
+        their shape, and which of the pieces they are.
     bound : float
         See `Smooth`.
     folds : int
@@ -94,17 +95,30 @@ class Shapes:
 
         That is found at vertices, and at the middles of edges and triangles.
         """
-        shape = np.repeat(np.arange(len(self.directions), dtype=np.int32), np.diff(self.first))
         moved, largest = points[self.vertices], 0.0
         for here, there in ((moved, self.corners), (self.corners, moved)):
             other = self.kernel(np.ascontiguousarray(there))
-            middles = (here + np.roll(here, 1, axis=1)) / 2
-            on_surface = self.directions[shape][:, None] == 2
-            centres = np.where(on_surface, here.mean(axis=1), middles[:, 1])
-            for some in (centres, *np.swapaxes(here, 0, 1), *np.swapaxes(middles, 0, 1)):
-                far = other.nearest(np.ascontiguousarray(some), shape, threads)[1]
+            for some in (*self._middles(here), *np.swapaxes(here, 0, 1)):
+                far = other.nearest(np.ascontiguousarray(some), self.shape, threads)[1]
                 largest = max(largest, float(far.max(initial=0)))
         return largest
+
+    def deviations(self, points: Array, threads: int = 1) -> Array:
+        """Tell how far (p,) the middles of each piece are from the reference, at most; its corners at points (k, d)."""
+        reference, middles = self.kernel(), self._middles(points[self.vertices])
+        far = [reference.nearest(np.ascontiguousarray(some), self.shape, threads)[1] for some in middles]
+        return np.asarray(np.max(far, axis=0))
+
+    @cached_property
+    def shape(self) -> Numbers:
+        """(p,) int32: the shape of each piece."""
+        return np.repeat(np.arange(len(self.directions), dtype=np.int32), np.diff(self.first))
+
+    def _middles(self, corners: Array) -> list[Array]:
+        """Return those of the sides of pieces and of the pieces themselves, (p, d) each."""
+        sides = np.swapaxes((corners + np.roll(corners, 1, axis=1)) / 2, 0, 1)
+        on_surface = self.directions[self.shape][:, None] == 2
+        return [np.where(on_surface, some, sides[1]) for some in (corners.mean(axis=1), *sides)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +212,7 @@ class _Plane(_Shaped):
         tangents = self.tangents(facets, vertices, pairs)
         pieces = _Pieces(facets, tangents, number[chain])
         edges = _both_ways(facets)
-        around = np.column_stack([edges, np.full(len(edges), -1), np.tile(number[chain], 2)]).astype(np.int32)
+        around = _around(edges, np.tile(number[chain], 2), np.tile(np.arange(len(facets)), 2))
         return _curved(shape, edges, around, [pieces], [1] * curves, self)
 
 
@@ -252,8 +266,10 @@ class _Solid(_Shaped):
         segments = _Pieces(features[:, [0, 1, 1]], tangents[:, [0, 1, 1]], of_curve[chain])
         both = _both_ways(features)
         turned = np.concatenate([np.roll(triangles.vertices, -i, axis=1) for i in range(3)])
-        along = np.column_stack([both, np.full(len(both), -1), np.tile(segments.shape, 2)])
-        around = np.concatenate([np.column_stack([turned, np.tile(triangles.shape, 3)]), along]).astype(np.int32)
+        number_of_segment = np.arange(len(features)) + len(triangles.shape)
+        along = _around(both, np.tile(segments.shape, 2), np.tile(number_of_segment, 2))
+        around = _around(turned, np.tile(triangles.shape, 3), np.tile(np.arange(len(triangles.shape)), 3))
+        around = np.concatenate([around, along])
         every = _both_ways(self.joints.edges)
         edges = np.concatenate([every[on_surface[every[:, 0]]], both[on_curve[both[:, 0]]]])
         directions = [2] * surfaces + [1] * curves
@@ -290,6 +306,12 @@ def _both_ways(edges: Numbers) -> Numbers:
     return np.concatenate([edges, edges[:, ::-1]])
 
 
+def _around(vertices: Numbers, shape: Numbers, piece: Places) -> Numbers:
+    """Return rows (r, 5): a vertex and the others, -1: there is no third, the shape and the piece that they make."""
+    third = [] if vertices.shape[1] == 3 else [np.full(len(vertices), -1)]
+    return np.column_stack([vertices, *third, shape, piece]).astype(np.int32)
+
+
 def _unit(vectors: Array) -> Array:
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
@@ -298,7 +320,7 @@ def _unit(vectors: Array) -> Array:
 def _curved(
     shape: Numbers, edges: Numbers, around: Numbers, pieces: list[_Pieces], directions: list[int], found: _Shaped
 ) -> Curved:
-    """Put together what slides: of pieces, and rows (r, 4) of what is around their first vertices, what is needed."""
+    """Put together what slides: of pieces, and rows (r, 5) of what is around their first vertices, what is needed."""
     points = found.points
     of_piece = np.concatenate([one.shape for one in pieces])
     order = np.argsort(of_piece, kind="stable")[int((of_piece < 0).sum()) :]
@@ -308,6 +330,9 @@ def _curved(
     ways = np.concatenate([one.ways for one in pieces])[order]
     around = around[(shape[around[:, 0]] >= 0) & (around[:, 3] >= 0)]
     around = around[np.argsort(around[:, 0], kind="stable")]
+    place = np.empty(len(of_piece), dtype=np.int32)
+    place[order] = np.arange(len(order), dtype=np.int32)
+    around[:, 4] = place[around[:, 4]]
     offsets = np.concatenate([[0], np.cumsum(np.bincount(around[:, 0], minlength=len(points)))]).astype(np.int32)
     shapes = Shapes(
         vertices, points[vertices], ways, first, np.array(directions, dtype=np.uint8), offsets,

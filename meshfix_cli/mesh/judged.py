@@ -96,6 +96,13 @@ class Judged:
         verdicts, _, quality = self._judge(points, threads)
         return min(1.0, float(quality[verdicts == VALID].min(initial=1.0)) ** 2)
 
+    def below(self, points: Array, sine2: float, threads: int) -> NDArray[np.integer]:
+        """Return the positions of those whose sine^2 is smaller, and of those that are not valid."""
+        if self.simplicial:
+            return kernels.below(points, self.simplices, sine2, threads)
+        verdicts, _, quality = self._judge(points, threads)
+        return np.flatnonzero((verdicts != VALID) | (quality * np.abs(quality) < sine2))
+
     def _judge(self, points: Array, threads: int) -> tuple[NDArray[np.uint8], Array, Array]:
         return kernels.judge(points, self._codes, self._offsets, self._nodes, threads)
 

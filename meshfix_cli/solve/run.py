@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from itertools import cycle
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,8 @@ if TYPE_CHECKING:
 
 FLOOR, LIFT = 1, 3.0  # percentile of the smallest angles; up to so many degrees above it they are the few worse ones
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
-RISE = 0.01  # degrees by which the smallest angle must rise, in `RAISE_PATIENCE` sweeps, to go on
 RAISE_PATIENCE = 2
-ROUND_RISE = 0.05  # degrees by which the smallest angle must rise for another round of "best"
+ROUNDING = 1e-9  # of a threshold: elements and stars are measured in different units
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
 EASY = 3  # sweeps: a tangle that took more, and of which at least `MANY` of the elements were inverted, was a hard one
@@ -41,6 +40,32 @@ GOAL_PATIENCE = 2
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What smoothing must gain to go on.
+
+    Attributes
+    ----------
+    rise : float
+        Degrees by which the smallest angle must rise in `RAISE_PATIENCE` sweeps of "best".
+    round_rise : float
+        Degrees by which it must rise for another round of these.
+    left : float
+        Share of the elements below the goal that may still be there after `GOAL_PATIENCE` turns through the moves.
+    iterations : int
+        Of the energy in another round, at most.
+    """
+
+    rise: float
+    round_rise: float
+    left: float
+    iterations: int
+
+
+# Where the boundary slides there is seldom a ceiling: the smallest angle creeps on, and takes the mean with it.
+PACE, SLIDING_PACE = Pace(0.01, 0.05, 1.0, ITERATIONS), Pace(0.03, 0.5, 0.9, 40)
 
 
 def _raised(sine2: float, degrees: float) -> float:
@@ -83,6 +108,7 @@ class Run(Positions):
         self.hard = False  # the last Laplacian sweeps were many, or left what the energy could mend
         self.untangling = 0  # sweeps
         share = self.left / max(1, self.count)
+        self.pace = SLIDING_PACE if self.freedom is not None and self.mendable.simplicial else PACE
         self.many, self.most = share >= MANY, share >= MOST
 
     def enter(self, phase: Phase) -> bool:
@@ -91,6 +117,8 @@ class Run(Positions):
             return False
         if phase.slides and self.freedom is None:
             return False
+        if Move.DRAW_BACK in phase.moves:
+            return self.left == 0 and self.freedom is not None and self.freedom.shapes is not None
         if phase.smooths:
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
                 return False
@@ -158,7 +186,8 @@ class Run(Positions):
         if Move.LAPLACIAN in phase.moves:
             self.hard = self.promising > 0 or self.most or (self.many and sweep > EASY)
         now = (self.points, self.record, self._rank())
-        self.best = now if self.best is None else min(self.best, now, key=lambda one: one[2])
+        is_best = self.best is None or now[2] < self.best[2] or Move.DRAW_BACK in phase.moves
+        self.best = now if is_best else self.best
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
@@ -229,7 +258,8 @@ class Run(Positions):
         goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
         floor = math.degrees(smallest) if phase.shapes in ("lost", "sharp") else 0.0
         sharpness = SHARPNESS if phase.shapes == "sharp" else 0.0
-        most = FEW_ITERATIONS if phase.elements and phase.shapes == "first" else ITERATIONS
+        most = self.pace.iterations if phase.shapes == "risen" else ITERATIONS
+        most = FEW_ITERATIONS if phase.elements and phase.shapes == "first" else most
         aims = Goal(goal, floor, max(self.min_measure, 0.0), sharpness)
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
@@ -259,7 +289,9 @@ class Run(Positions):
             return False
         from meshfix_cli.solve.compared import Compared  # the formulas of metrics, which others do not need
 
-        self.compared = self.compared or Compared(self.input, self.mendable, self.own, self.team, self.threads)
+        self.compared = self.compared or Compared(
+            self.input, self.mendable, self.own, self.team, self.threads, self.min_measure
+        )
         return self._go_to(self.compared.add(self.points, self._of))
 
     def take_compared(self) -> bool:
@@ -286,7 +318,7 @@ class Run(Positions):
             return False
         smallest = self._least(self._angles(self.points))
         below = math.sin(min(smallest, math.pi / 2)) ** 2 < self._min_sine2(self.stuck)
-        return below and smallest > self.kept[2] + math.radians(ROUND_RISE)
+        return below and smallest > self.kept[2] + math.radians(self.pace.round_rise)
 
     def take_back(self) -> bool:
         """Return to where the last minimisation of the shape began, if the smallest angle is smaller than there."""
@@ -308,7 +340,7 @@ class Run(Positions):
         self.uneven = True
         while True:
             below, smallest = self.team.total(int((angles < goal)[self.own].sum())), self._least(angles)
-            rises = below < fewest or smallest > largest + math.radians(GOAL_RISE)
+            rises = below < self.pace.left * fewest or smallest > largest + math.radians(GOAL_RISE)
             fewest, largest, waited = min(fewest, below), max(largest, smallest), 0 if rises else waited + 1
             if below == 0 or waited == GOAL_PATIENCE:
                 return
@@ -323,11 +355,21 @@ class Run(Positions):
     def _raisings(self, move: Move, near: Mask) -> Iterator[Array]:
         ceiling = self._min_sine2(self.stuck)
         smallest, waited = self._min_sine2(self.mendable), 0
+        held = 0.0 if self.kept is None else math.sin(min(self.kept[2], math.pi / 2)) ** 2
         while smallest < ceiling and waited < RAISE_PATIENCE:
-            yield self._relocated(self.points, move, _due(near & self.team.own_vertices), _raised(smallest, RAISE))
+            threshold = _raised(smallest, RAISE)
+            yield self._relocated(self.points, move, self._due_below(threshold, near), threshold)
             now = self._min_sine2(self.mendable)
-            waited = 0 if now > _raised(smallest, RISE) else waited + 1
+            pace = self.pace if now > held else PACE
+            waited = 0 if now > _raised(smallest, pace.rise) else waited + 1
             smallest = max(smallest, now)
+
+    def _due_below(self, sine2: float, near: Mask) -> NDArray[np.uint8]:
+        """States for a sweep that visits those `near` at elements below a threshold, and others as they come there."""
+        states = (near & self.team.own_vertices).astype("u1") * kernels.DONE
+        low = self._of(self.mendable.below(self.points, sine2 * (1 + ROUNDING), self.threads))
+        states[low & (states > 0)] = kernels.DUE
+        return states
 
     def _towards_reference(self, phase: Phase) -> Iterator[Array]:
         from meshfix_cli.solve import layers, towards
@@ -351,4 +393,3 @@ class Run(Positions):
 
         compute = partial(minimisations_in_regions, phase.rings, self.max_move, self.threads, self.team.freedom)
         return self._of_whole(compute, self.points, self.first[0], self.together, self._broken())
-

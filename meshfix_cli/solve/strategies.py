@@ -36,6 +36,7 @@ class Move(IntEnum):
     RAISE_SMALLEST = 7
     COME_BACK = 8
     UNTANGLE_COEFFICIENTS = 9
+    DRAW_BACK = 10
 
 
 Smooth = int | Literal["auto", "best"]
@@ -125,6 +126,7 @@ _LP_COEFFICIENTS = Phase(
 )  # fmt: skip
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
+_TO_SHAPE = Phase("back to the shape", (Move.DRAW_BACK,), 100, until="settled", from_best=True, slides=True)
 _FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
 
 
@@ -219,9 +221,10 @@ def plan(
         untangling = tuple(region for phase in untangling for region in _in_regions(phase))
     most = smooth if isinstance(smooth, int) else PASSES if smooth == "auto" else MORE_SWEEPS
     if to_reference:
-        return (_FOLLOW, _TO_REFERENCE, _LP_COEFFICIENTS, *untangling, replace(_APPROACH, max_sweeps=most))
+        return (_FOLLOW, _TO_REFERENCE, _LP_COEFFICIENTS, *untangling, _TO_SHAPE, replace(_APPROACH, max_sweeps=most))
     if strategy == "auto" and not only_invalid:
         untangling = (_LAYERS, *untangling, replace(_LAYERS_SMOOTHED, max_sweeps=most))
+    untangling = (*untangling, _TO_SHAPE)
     passes = Phase(SMOOTHING, (Move.COMBINED_SMOOTH,), PASSES, until="settled", from_best=True)
     if only_invalid and smooth == 0:
         return (*untangling, _BACK)

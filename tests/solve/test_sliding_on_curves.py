@@ -19,6 +19,8 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.summary import change_of_shape, summarise
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.perturb import Distance, perturb
+from meshfix_cli.solve.strategies import Move, plan
+from meshfix_cli.solve.untangle import drain, steps
 
 Points = NDArray[np.float64]
 
@@ -39,7 +41,7 @@ def deviation(mesh: Mesh) -> float:
     shapes, points = freedom_of(mesh).shapes, mesh.along_curve(mesh.points)
     assert shapes is not None
     here = np.repeat(np.arange(len(points)), np.diff(shapes.offsets))
-    a, b, shape = shapes.around.T
+    a, b, shape, _ = shapes.around.T
     middles = (points[here] + points[a]) / 2
     centres = np.where(b[:, None] < 0, middles, (points[here] + points[a] + points[b]) / 3)
     kernel, shape = shapes.kernel(), np.ascontiguousarray(shape)
@@ -168,3 +170,19 @@ def test_a_valid_mesh_does_not_get_worse() -> None:
     after = untangle(sliding_on_curves(valid), smooth=5, threshold=30).after
     assert after.check()[0] == 0
     assert summarise(after).min_angle >= summarise(valid).min_angle
+
+
+@pytest.mark.parametrize("made", [shell, bent])
+def test_facets_that_have_left_the_shape_come_back_to_it_while_the_mesh_stays_valid(
+    made: Callable[[], tuple[Points, NDArray[np.int32]]],
+) -> None:
+    mesh, phases = tangled(Mesh.build(*made()), 50), plan("auto", 0)
+    without = [phase for phase in phases if Move.DRAW_BACK not in phase.moves]
+    left, back = (drain(steps(mesh, some))[2] for some in (without, phases))
+    assert back.check()[0] == 0
+    shapes = freedom_of(mesh).shapes
+    assert shapes is not None
+    far, near = (shapes.deviations(one.along_curve(one.points)) / shapes.bound for one in (left, back))
+    assert (near > 1).sum() < (far > 1).sum() / 2
+    assert near.max() == pytest.approx(deviation(back) / shapes.bound)
+    assert near.max() <= far.max()

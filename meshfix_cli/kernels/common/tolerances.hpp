@@ -47,6 +47,9 @@ constexpr int NEWTON_TRIALS = 5;       // steps, each half as long as the one be
 // Steps of smoothing, each half as long as the one before, that are tried where an element would not be valid inside.
 constexpr int GUARD_TRIALS = 4;
 
+// Of the square of how far facets are from their shapes: what draws a vertex back makes it as much smaller.
+constexpr double DRAWN_BACK = 0.9;
+
 // Of the way back: smaller shares are not worth a step, and would have no end.
 constexpr double LEAST_SHARE = 0.01;
 

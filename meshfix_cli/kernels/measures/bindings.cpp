@@ -32,6 +32,12 @@ double min_sine2_py(const Matrix<const double>& points, const Matrix<const std::
     });
 }
 
+auto below_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, double least, int threads) {
+    return to_numpy(with_dimension(points.shape(1), [&](auto d) {
+        return below<d>(points.data(), simplices.data(), static_cast<std::int64_t>(simplices.shape(0)), least, threads);
+    }));
+}
+
 auto measure_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices, int threads) {
     const auto m = static_cast<std::int64_t>(simplices.shape(0));
     std::vector<double> measure(m);
@@ -156,6 +162,7 @@ void bind_measures(nb::module_& m) {
     m.def("summarise", &summarise_py, "points"_a.noconvert(), "mesh"_a, "bins"_a, "width"_a, "threads"_a);
     m.def("check", &check_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("min_sine2", &min_sine2_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
+    m.def("below", &below_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "least"_a, "threads"_a);
     m.def("measure", &measure_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("angles", &angles_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "threads"_a);
     m.def("judge", &judge_py, "points"_a.noconvert(), "codes"_a.noconvert(), "offsets"_a.noconvert(),

@@ -137,15 +137,35 @@ Validity check(const double* points, const std::int32_t* simplices, std::int64_t
     return total;
 }
 
-// The smallest sine^2 of the valid simplices; 1: there are none.
+// The smallest sine^2 of simplex s with edges e; not positive: it is not valid.
+template <int D>
+double sine2_of(const double* points, const std::int32_t* simplices, std::int64_t s, const Edges<D>& e) {
+    const double sine2 = min_sine2(e, true);
+    return sine2 > 0.0 ? sine2 : barely_min_sine2<D>(corners_of<D>(points, simplices + s * (D + 1)), 0.0);
+}
+
+// The simplices, ascending, of which that is below some value.
+template <int D>
+std::vector<std::int32_t> below(const double* points, const std::int32_t* simplices, std::int64_t m, double least,
+                                int threads) {
+    using Rows = std::vector<std::int32_t>;
+    const auto look = [&](Rows& part, std::int64_t s, const Edges<D>& e) {
+        if (!(sine2_of<D>(points, simplices, s, e) >= least)) part.push_back(static_cast<std::int32_t>(s));
+    };
+    Rows rows;
+    for (const Rows& part : for_each_simplex<Rows, D>(points, simplices, m, threads, look))
+        rows.insert(rows.end(), part.begin(), part.end());
+    return rows;
+}
+
+// The smallest of the valid simplices; 1: there are none.
 template <int D>
 double min_sine2(const double* points, const std::int32_t* simplices, std::int64_t m, int threads) {
     struct Smallest {
         double sine2 = 1.0;
     };
     const auto look = [&](Smallest& part, std::int64_t s, const Edges<D>& e) {
-        double sine2 = min_sine2(e, true);
-        if (!(sine2 > 0.0)) sine2 = barely_min_sine2<D>(corners_of<D>(points, simplices + s * (D + 1)), 0.0);
+        const double sine2 = sine2_of<D>(points, simplices, s, e);
         if (sine2 > 0.0) part.sine2 = std::min(part.sine2, sine2);
     };
     double smallest = 1.0;

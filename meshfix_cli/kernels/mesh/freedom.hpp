@@ -6,8 +6,9 @@
 // axes (f, D, D)          orthonormal rows, of which those directions are the first; of lines and planes alone
 // offsets (n+1), neighbours   of those that do not go anywhere: their neighbours in what they slide in; or none
 // reference               null: there are only lines and planes
-// around_offsets (n+1), around (r, 3)   of those on a reference: the other end of an edge and -1, or the other corners of a
-//                         triangle, and the shape from which these may not go far
+// around_offsets (n+1), around (r, 4)   of those on a reference: the other end of an edge and -1, or the other corners of a
+//                         triangle, the shape from which these may not go far, and their own piece of it; the last is of the
+//                         shape on which the vertex is
 // bound2                  the square of how far that is
 #pragma once
 
@@ -30,6 +31,12 @@ struct Freedom {
 
     bool anywhere(std::int64_t v) const { return frame[v] < 0; }
 
+    // The piece of the reference that v itself had there.
+    std::int64_t piece(std::int64_t v) const {
+        if (around.empty() || around_offsets[v] == around_offsets[v + 1]) return Reference::ANY;
+        return around[4 * static_cast<std::size_t>(around_offsets[v + 1]) - 1];
+    }
+
     // That of a vertex on the reference; negative: it is not on one.
     std::int32_t shape(std::int64_t v) const {
         return reference == nullptr ? -1 : frame[v] - static_cast<std::int32_t>(directions.size() - reference->shapes());
@@ -46,6 +53,7 @@ struct Directions {
     bool aligned = false;        // the axes are those of the coordinates
     const Reference* reference = nullptr;  // null: it is on none
     std::int32_t shape = -1;
+    mutable std::int64_t piece = Reference::ANY;  // on which the last foot was: the next one is near it
 
     bool anywhere() const { return count == D; }
     bool curved() const { return reference != nullptr; }
@@ -61,7 +69,9 @@ struct Directions {
         if (shape < 0) return set(freedom, v, start);
         count = freedom.directions[freedom.frame[v]];
         reference = freedom.reference;
-        axes = reference->axes<D>(shape, here);
+        const Foot<D> foot = reference->foot<D>(shape, here, freedom.piece(v));
+        piece = foot.piece;
+        axes = reference->axes<D>(shape, foot);
         kept.fill(false);
     }
 
@@ -90,8 +100,14 @@ struct Directions {
 
     // The nearest position, from the anchor: a step from the last one would leave the plane bit by bit.
     Vec<D> onto(const Vec<D>& p) const {
-        if (curved()) return reference->onto<D>(shape, p);
+        if (curved()) return on_reference(p);
         return anywhere() ? p : with_kept(aligned ? p : anchor + along(p - anchor));
+    }
+
+    Vec<D> on_reference(const Vec<D>& p) const {
+        const Foot<D> foot = reference->foot<D>(shape, p, piece);
+        piece = foot.piece;
+        return reference->rounded<D>(shape, foot);
     }
 
     Vec<D> with_kept(Vec<D> p) const {

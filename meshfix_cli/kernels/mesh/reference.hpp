@@ -28,6 +28,8 @@ struct Foot {
 
 class Reference {
    public:
+    static constexpr std::int64_t ANY = -1;  // piece
+
     Reference(int dimension, std::vector<double> corners, std::vector<double> ways, const std::vector<std::int32_t>& first,
               std::vector<std::uint8_t> directions)
         : dimension_(dimension), corners_(std::move(corners)), ways_(std::move(ways)), directions_(std::move(directions)) {
@@ -46,25 +48,24 @@ class Reference {
     std::size_t shapes() const { return roots_.size(); }
     int directions(std::int32_t shape) const { return directions_[shape]; }
 
+    // `near`: a piece of the shape from which the search begins, or `ANY`; of pieces that are equally near the first is taken.
     template <int D>
-    Foot<D> foot(std::int32_t shape, const Vec<D>& p) const {
+    Foot<D> foot(std::int32_t shape, const Vec<D>& p, std::int64_t near = ANY) const {
         Foot<D> best = any_foot<D>(shape);
-        std::array<std::int32_t, 64> waiting;
-        int count = 0;
-        waiting[count++] = roots_[shape];
-        while (count > 0) {
-            const Node& node = nodes_[waiting[--count]];
-            if (!(distance2<D>(node, p) < best.distance2)) continue;
-            if (node.right == 0) {
-                for (std::int32_t i = node.begin; i < node.end; ++i) look<D>(shape, order_[i], p, best);
-                continue;
-            }
-            std::int32_t near = static_cast<std::int32_t>(&node - nodes_.data()) + 1, far = node.right;
-            if (distance2<D>(nodes_[far], p) < distance2<D>(nodes_[near], p)) std::swap(near, far);
-            waiting[count++] = far;
-            waiting[count++] = near;
-        }
+        if (near != ANY) look<D>(shape, static_cast<std::int32_t>(near), p, best);
+        search<D>(shape, p, best, 0.0);
         return best;
+    }
+
+    // Whether the shape is within the root of `bound2`; most often it is the piece `near` that is.
+    template <int D>
+    bool is_within(double bound2, std::int32_t shape, const Vec<D>& p, std::int64_t near) const {
+        Foot<D> best = any_foot<D>(shape);
+        look<D>(shape, static_cast<std::int32_t>(near), p, best);
+        if (best.distance2 <= bound2) return true;
+        best.distance2 = std::nextafter(bound2, INFINITY);
+        search<D>(shape, p, best, bound2);
+        return best.distance2 <= bound2;
     }
 
     // The foot, drawn half of the way to its projections to the planes (lines) at the corners of its piece, by its weights:
@@ -81,15 +82,9 @@ class Reference {
         return 0.5 * (foot.point + sum);
     }
 
+    // The directions of a shape at a foot, orthonormal; one in a curve, two in a surface.
     template <int D>
-    Vec<D> onto(std::int32_t shape, const Vec<D>& p) const {
-        return rounded<D>(shape, foot<D>(shape, p));
-    }
-
-    // The directions of a shape near a position, orthonormal; one in a curve, two in a surface.
-    template <int D>
-    Edges<D> axes(std::int32_t shape, const Vec<D>& p) const {
-        const Foot<D> here = foot<D>(shape, p);
+    Edges<D> axes(std::int32_t shape, const Foot<D>& here) const {
         Vec<D> way{};
         for (int i = 0; i <= directions_[shape]; ++i) way = way + here.weights[i] * at<D>(ways_, here.piece, i);
         const double length = std::sqrt(norm2(way));
@@ -126,6 +121,26 @@ class Reference {
     template <int D>
     Vec<D> at(const std::vector<double>& values, std::int64_t piece, int corner) const {
         return load<D>(values.data() + (piece * D + corner) * D);
+    }
+
+    // For what is nearer than the best so far, until that is near enough.
+    template <int D>
+    void search(std::int32_t shape, const Vec<D>& p, Foot<D>& best, double enough2) const {
+        std::array<std::int32_t, 64> waiting;
+        int count = 0;
+        waiting[count++] = roots_[shape];
+        while (count > 0 && best.distance2 > enough2) {
+            const Node& node = nodes_[waiting[--count]];
+            if (!(distance2<D>(node, p) < best.distance2)) continue;
+            if (node.right == 0) {
+                for (std::int32_t i = node.begin; i < node.end; ++i) look<D>(shape, order_[i], p, best);
+                continue;
+            }
+            std::int32_t near = static_cast<std::int32_t>(&node - nodes_.data()) + 1, far = node.right;
+            if (distance2<D>(nodes_[far], p) < distance2<D>(nodes_[near], p)) std::swap(near, far);
+            waiting[count++] = far;
+            waiting[count++] = near;
+        }
     }
 
     // Of a position that is at no distance from anything, for it is no number.

@@ -299,6 +299,7 @@ void bind_moves(nb::module_& m) {
           "threads"_a,
           "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
+    m.attr("DONE") = DONE;
     m.attr("DUE") = DUE;
 
     m.def("embedding", &embedding_py, "points"_a.noconvert(), "mesh"_a, "free"_a.noconvert(), "edges"_a,
@@ -318,7 +319,7 @@ void bind_moves(nb::module_& m) {
         .def_prop_ro("evaluations",
                      [](PyFoldover& self) { return self.with_problem([](auto& p) { return p.evaluations(); }); });
 
-    static_assert(static_cast<int>(Move::untangle_coefficients) == 9, "the codes of strategies.Move");
+    static_assert(static_cast<int>(Move::draw_back) == 10, "the codes of strategies.Move");
 }
 
 }  // namespace meshfix

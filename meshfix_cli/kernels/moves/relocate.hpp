@@ -15,7 +15,7 @@ namespace meshfix {
 
 enum class Move : int {
     laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
-    come_back, untangle_coefficients
+    come_back, untangle_coefficients, draw_back
 };
 
 struct Parameters {
@@ -81,7 +81,7 @@ struct Relocation {
         const double least = curved ? std::min(min_sine2<D>(star, x, 0.0), min_sine2<D>(star, star.position, 0.0)) : 0.0;
         Vec<D> trial = x;
         for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
-            const bool good = !curved || (is_near(v, trial) && min_sine2<D>(star, trial, least * (1.0 - SAME_SINE2)) > 0.0);
+            const bool good = !curved || (min_sine2<D>(star, trial, least * (1.0 - SAME_SINE2)) > 0.0 && is_near(v, trial));
             if (good && (!has_inside || loses_nothing(v, trial))) return trial;
             trial = star.snap(star.position + 0.5 * (trial - star.position));
         }
@@ -95,8 +95,8 @@ struct Relocation {
         const bool valid = star.valid(star.position);
         Vec<D> trial = star.snap(x);
         for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
-            const bool near = valid ? is_near(v, trial) : is_in_reach(v, star.to_global(trial));
-            if (near && !(min_det(trial) < least)) return star.to_global(trial);
+            const bool good = !(min_det(trial) < least);
+            if (good && (valid ? is_near(v, trial) : is_in_reach(v, star.to_global(trial)))) return star.to_global(trial);
             trial = star.snap(star.position + 0.5 * (trial - star.position));
         }
         return load<D>(points + v * D);
@@ -105,26 +105,43 @@ struct Relocation {
     // Whether a vertex on the reference may be at x: in reach, with the facets around it near their shapes, or nearer than
     // they are.
     bool is_near(std::int64_t v, const Vec<D>& x) const {
-        const Vec<D> there = star.to_global(x);
+        const Vec<D> there = star.to_global(x), here = load<D>(points + v * D);
+        const double bound2 = parameters.freedom->bound2;
         if (!is_in_reach(v, there)) return false;
-        const double deviation2 = deviation2_at(v, there);
-        return deviation2 <= parameters.freedom->bound2 || deviation2 <= deviation2_at(v, load<D>(points + v * D));
+        if (is_within(bound2, v, there)) return true;
+        return !is_within(bound2, v, here) && is_within(deviation2_at(v, here), v, there);
     }
 
-    // The largest distance^2 of the middles of edges and triangles around v, if it is at x, from their shapes.
-    double deviation2_at(std::int64_t v, const Vec<D>& x) const {
+    // Calls look(p, shape, piece) for the middles of edges and triangles around v, if it is at x, while that returns true.
+    template <class F>
+    bool for_each_middle(std::int64_t v, const Vec<D>& x, const F& look) const {
         const Freedom& freedom = *parameters.freedom;
-        double largest = 0.0;
-        const auto look = [&](std::int32_t shape, const Vec<D>& p) {
-            largest = std::max(largest, freedom.reference->template foot<D>(shape, p).distance2);
-        };
         for (std::int32_t i = freedom.around_offsets[v]; i < freedom.around_offsets[v + 1]; ++i) {
-            const std::int32_t* row = freedom.around.data() + 3 * static_cast<std::int64_t>(i);
+            const std::int32_t* row = freedom.around.data() + 4 * static_cast<std::int64_t>(i);
             const Vec<D> a = load<D>(points + static_cast<std::int64_t>(row[0]) * D);
-            look(row[2], 0.5 * (x + a));
-            if (row[1] >= 0) look(row[2], (1.0 / 3.0) * (x + a + load<D>(points + static_cast<std::int64_t>(row[1]) * D)));
+            if (!look(0.5 * (x + a), row[2], row[3])) return false;
+            if (row[1] < 0) continue;
+            const Vec<D> b = load<D>(points + static_cast<std::int64_t>(row[1]) * D);
+            if (!look((1.0 / 3.0) * (x + a + b), row[2], row[3])) return false;
         }
+        return true;
+    }
+
+    // The largest distance^2 of them from their shapes.
+    double deviation2_at(std::int64_t v, const Vec<D>& x) const {
+        double largest = 0.0;
+        for_each_middle(v, x, [&](const Vec<D>& p, std::int32_t shape, std::int32_t piece) {
+            largest = std::max(largest, parameters.freedom->reference->template foot<D>(shape, p, piece).distance2);
+            return true;
+        });
         return largest;
+    }
+
+    // Whether none is farther away: most of them are found to be near by their own pieces alone.
+    bool is_within(double bound2, std::int64_t v, const Vec<D>& x) const {
+        return for_each_middle(v, x, [&](const Vec<D>& p, std::int32_t shape, std::int32_t piece) {
+            return parameters.freedom->reference->template is_within<D>(bound2, shape, p, piece);
+        });
     }
 
     bool is_in_reach(std::int64_t v, const Vec<D>& x) const {
@@ -284,6 +301,28 @@ struct Relocation {
         return star.valid(x) && store(v, share == 1.0 ? start : star.to_global(x));
     }
 
+    // To where facets that are too far from their shapes are least so, of some places on the way to the start and to the mean
+    // of the neighbours; in a valid star, which stays valid.
+    bool draw_back(std::int64_t v) {
+        const Vec<D> here = load<D>(points + v * D);
+        if (is_within(parameters.freedom->bound2, v, here) || !star.valid(star.position)) return false;
+        Vec<D> best = here;
+        double least = deviation2_at(v, here);
+        for (const Vec<D>& target : {star.to_local(load<D>(parameters.start + v * D)), star.centre}) {
+            Vec<D> trial = star.snap(target);
+            for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
+                const Vec<D> there = star.to_global(trial);
+                const bool good = star.valid(trial) && is_in_reach(v, there) && is_within(DRAWN_BACK * least, v, there);
+                if (good && (D == 2 || stars.elements == nullptr || loses_nothing(v, trial))) {
+                    best = there;
+                    least = deviation2_at(v, there);
+                }
+                trial = star.snap(star.position + 0.5 * (trial - star.position));
+            }
+        }
+        return best != here && store(v, best);
+    }
+
     Vec<D> smoothed(double quality, bool optimise) {
         Vec<D> x = smart_laplacian(star, quality);
         if (optimise && quality < LP_PINCHED_SINE2) x = smart_programme(x, quality);
@@ -327,6 +366,7 @@ struct Relocation {
             return;
         }
         if (move != Move::laplacian) states[v] = DONE;
+        if (move == Move::draw_back && !curved) return;
         star.gather(stars, parameters.freedom, parameters.start, points, v);
         switch (move) {
             case Move::untangle: counts.moved += untangle(v); break;
@@ -338,6 +378,7 @@ struct Relocation {
             case Move::raise_smallest: counts.moved += raise_smallest(v); break;
             case Move::come_back: counts.moved += come_back(v); break;
             case Move::untangle_coefficients: counts.moved += untangle_coefficients(v); break;
+            case Move::draw_back: counts.moved += draw_back(v); break;
             case Move::laplacian: counts.moved += place(v, reached(v, star.centre, -INFINITY)); break;
         }
     }

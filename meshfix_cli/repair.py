@@ -146,8 +146,9 @@ class Method:
     """How a mesh is untangled and smoothed; the fields are those of `untangle.steps` and `strategies.plan`.
 
     `slide` and `slide_interfaces` tell which vertices of the boundary and of interfaces move as well, where that does
-    not change the shape, or, with "curved", by little; see `curved.Smooth` for the next two. With `curving` "relax"
-    curved edges of the boundary become straighter where elements cannot be valid otherwise.
+    not change the shape, or, with "curved", by little; see `curved.Smooth` for the next two, of which h is that of the
+    boundary. With `curving` "relax" curved edges of the boundary become straighter where elements cannot be valid
+    otherwise.
     """
 
     strategy: str = "auto"
@@ -173,7 +174,7 @@ class Method:
             from meshfix_cli.mesh.curved import Smooth
 
             mesh = document.mesh if reference is None else document.mesh.with_vertices(reference)
-            smooth = Smooth(self.feature_angle, self.max_deviation.length(mesh))
+            smooth = Smooth(self.feature_angle, self.max_deviation.on_boundary(mesh))
         return slid(document, self.slide_interfaces, reference, smooth=smooth)
 
     def reach(self, mesh: Mesh, threads: int) -> float:
@@ -288,7 +289,10 @@ class Judge:
         if not (self.brief or command == "perturb"):
             start = next(iter(stages.values()))
             before = start if reference is None else start.with_vertices(reference)
-            slides = self._sliding(document, before, result, summaries[shown[-1]], most)
+            if result.freedom is None:
+                slides = self._might_slide(document, result, summaries[shown[-1]], most)
+            else:
+                slides = {**self._slid(before, result), "ceiling_without_sliding": ceiling(start.held, self.threads)}
             more["facts"] = {**(more.get("facts") or {}), **slides}
         return Report(
             name=document.name,
@@ -307,24 +311,24 @@ class Judge:
             **more,
         )
 
-    def _sliding(
-        self, document: Document, before: Mesh, result: Mesh, summary: Summary, most: float | None
-    ) -> dict[str, Any]:
-        """Return how many vertices slide, and what that made of the shape.
-
-        Where none may and a ceiling limits the mesh: what might be gained. `before`: where the shape was found.
-        """
-        from meshfix_cli.quality.summary import ceiling, change_of_shape
+    def _slid(self, before: Mesh, result: Mesh) -> dict[str, Any]:
+        """Return how many vertices slide, and what that made of the shape; `before`: where that was found."""
+        from meshfix_cli.quality.summary import change_of_shape
 
         freedom = result.freedom
-        if freedom is not None:
-            moving = result.along_curve(result.movable)
-            flat, curved = freedom.degrees[moving & ~freedom.curved], freedom.degrees[moving & freedom.curved]
-            counts = {"lines": int((flat == 1).sum()), "planes": int((flat == 2).sum())}
-            if freedom.shapes is None:
-                return {"sliding": counts}
-            counts.update(curves=int((curved == 1).sum()), surfaces=int((curved == 2).sum()))
-            return {"sliding": counts, "shape": change_of_shape(before, result, self.threads)}
+        assert freedom is not None
+        moving = result.along_curve(result.movable)
+        flat, curved = freedom.degrees[moving & ~freedom.curved], freedom.degrees[moving & freedom.curved]
+        counts = {"lines": int((flat == 1).sum()), "planes": int((flat == 2).sum())}
+        if freedom.shapes is None:
+            return {"sliding": counts}
+        counts.update(curves=int((curved == 1).sum()), surfaces=int((curved == 2).sum()))
+        return {"sliding": counts, "shape": change_of_shape(before, result, self.threads)}
+
+    def _might_slide(self, document: Document, result: Mesh, summary: Summary, most: float | None) -> dict[str, Any]:
+        """Return what might be gained where no vertex slides and a ceiling limits the mesh."""
+        from meshfix_cli.quality.summary import ceiling
+
         valid = summary.inverted == 0
         if most is None or (valid and summary.smallest < NEAR_CEILING * most):
             return {}
@@ -401,20 +405,24 @@ def _solved(
     reach: float,
     reference: NDArray[np.float64] | None,
 ) -> tuple[Document, Outcome, tuple[str, ...]]:
-    """Solve a mesh in which vertices slide as they may; where that leads astray, less, and say so."""
+    """Solve a mesh in which vertices slide as they may; where that leads astray, less, and say so.
+
+    What counts is what the file will hold: boundaries of few digits may have been smoothed away from what these allow.
+    """
     freed = method.freed(document, reference)
     outcome = solve(freed.mesh, reach)
     notes: tuple[str, ...] = ()
+    rounded = 0  # elements that rounding has inverted: then less may be better also where it is valid
     for slide in SLIDES[: SLIDES.index(method.slide)][::-1]:
-        left = outcome.records[-1]
-        if not left.inverted:
+        left, rounded = outcome.records[-1].inverted, rounded or freed.first_valid_as_stored(outcome.after)[1]
+        if not (left or rounded):
             break
         other = replace(method, slide=slide).freed(document, reference)
         instead = solve(other.mesh, reach)
-        if instead.records[-1].rank < left.rank:
+        if _rank(other, instead) < _rank(freed, outcome):
             freed, outcome = other, instead
-            inverted = counted(left.inverted, "element", "elements")
-            notes = (f"--slide {method.slide} would leave {inverted} inverted, so that --slide {slide} is taken",)
+            inverted, why = counted(left or rounded, "element", "elements"), "" if left else ", rounded for the file,"
+            notes = (f"--slide {method.slide}{why} would leave {inverted} inverted, so that --slide {slide} is taken",)
     return freed, outcome, notes
 
 
@@ -436,6 +444,15 @@ def _of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, thre
     many = counted(found[0], "curved node of the boundary", "curved nodes of the boundary")
     far = f"{found[1]:.3g} ({found[1] / before.mean_edge_length():.2g}h)"
     return (f"--curving relax would move {many} by at most {far}, and all elements are valid then",)
+
+
+def _rank(document: Document, outcome: Outcome) -> tuple[int, float]:
+    """Return how good is what a file will hold: the smaller the better."""
+    from meshfix_cli.quality.summary import summarise
+
+    mesh, _ = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
+    stored = summarise(document.as_stored(mesh))
+    return stored.inverted, -stored.smallest
 
 
 def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:

@@ -257,6 +257,25 @@ writing = packed(
     *_STORE,
     click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
 )
+_SLIDE = (
+    click.option(
+        "--slide",
+        type=click.Choice(SLIDES),
+        default="none",
+        show_default=True,
+        help="Let vertices of the boundary move where that does not change its shape. flat: in planes and on straight "
+        "edges; corners and what is curved stay. curved: on smooth surfaces and along their edges as well, which "
+        "changes the shape a little.",
+    ),
+    click.option(
+        "--feature-angle",
+        type=_Range(0, 180),
+        default=40.0,
+        show_default=True,
+        metavar="DEGREES",
+        help="With --slide curved: facets that meet at a larger angle meet at an edge that stays.",
+    ),
+)
 solving = packed(
     "method",
     Method,
@@ -290,29 +309,14 @@ solving = packed(
     ),
     click.option("--max-move", type=LENGTH, help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
     click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
-    click.option(
-        "--slide",
-        type=click.Choice(SLIDES),
-        default="none",
-        show_default=True,
-        help="Let vertices of the boundary move where that does not change its shape. flat: in planes and on straight "
-        "edges; corners and what is curved stay. curved: on smooth surfaces and along their edges as well, which "
-        "changes the shape a little.",
-    ),
-    click.option(
-        "--feature-angle",
-        type=_Range(0, 180),
-        default=40.0,
-        show_default=True,
-        metavar="DEGREES",
-        help="With --slide curved: facets that meet at a larger angle meet at an edge that stays.",
-    ),
+    *_SLIDE,
     click.option(
         "--max-deviation",
         type=LENGTH,
         default=str(MAX_DEVIATION),
         show_default=True,
-        help="With --slide curved: no step takes the middles of edges and facets farther from the shape.",
+        help="With --slide curved: no step takes the middles of edges and facets farther from the shape. h: a mean "
+        "edge of the boundary.",
     ),
     click.option(
         "--slide-interfaces/--no-slide-interfaces",
@@ -329,6 +333,7 @@ solving = packed(
         "found to do, where elements cannot be valid otherwise.",
     ),
 )
+sliding = packed("method", Method, *_SLIDE)
 drawing = packed(
     "draw",
     Draw,

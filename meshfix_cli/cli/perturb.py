@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import click
 
 from meshfix_cli.cli.files import open_files, report_stream
-from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, writing
+from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, sliding, writing
 from meshfix_cli.repair import Files, Held, Method
 from meshfix_cli.solve.perturb import Distance
 
@@ -14,15 +16,26 @@ from meshfix_cli.solve.perturb import Distance
 @writing
 @click.option("--percent", type=PERCENT, required=True, help="Of all vertices; interior ones move.")
 @click.option("--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")
-@click.option("--boundary", is_flag=True, help="Move vertices of a flat boundary as well, in its planes and edges.")
+@click.option("--boundary", is_flag=True, help="The same as --slide flat.")
+@sliding
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
 @drawing
 @holding
 @reporting
 def perturb(
-    files: Files, held: Held, show: Show, draw: Draw, percent: float, dist: Distance, boundary: bool, seed: int
+    files: Files,
+    held: Held,
+    show: Show,
+    draw: Draw,
+    method: Method,
+    percent: float,
+    dist: Distance,
+    boundary: bool,
+    seed: int,
 ) -> None:
     """Tangle a mesh as the paper does: move some interior vertices by a distance in random directions.
+
+    With --slide, vertices of the boundary move as well, each in its plane, on its surface or along its edge.
 
     With one seed, the same vertices move in the same directions whatever --percent and --dist are. Exits with 0
     whether or not elements are inverted.
@@ -31,8 +44,9 @@ def perturb(
 
     draw.check()
     document, output = open_files(files, held, show.threads, *draw.names)
-    if boundary:
-        document = Method(slide="flat").freed(document)
+    if boundary and method.slide == "none":
+        method = replace(method, slide="flat")
+    document = method.freed(document)
     length = dist.length(document.mesh, show.threads)
     perturbed, moved = tangle(document.mesh, percent, length, seed)
     result, notes = files.write(document, perturbed, output)

@@ -148,6 +148,11 @@ class Mesh:
             return self.movable
         return self.movable & ~self.topology.of_vertices(self.freedom.frame >= 0)
 
+    @property
+    def held(self) -> Mesh:
+        """The same mesh, in which nothing slides."""
+        return replace(self, movable=read_only(self.anywhere), freedom=None)
+
     def along_curve(self, values: NDArray[_T]) -> NDArray[_T]:
         """Return values (n, ...) of the points as those (k, ...) of the connectivity's vertices."""
         return rows_of(values, self.topology.connectivity.vertices)
@@ -178,6 +183,14 @@ class Mesh:
         """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
         self.topology.stars(threads)
         points, (start, end) = self.along_curve(self.points), self.topology.edges()
+        return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
+
+    def boundary_edge_length(self) -> float:
+        """Return the mean length of the sides of the boundary's facets, in model units: no tangle inside changes it."""
+        points, facets = self.along_curve(self.points), self.topology.facets_between(None)[0]
+        following = np.roll(facets, -1, axis=1)
+        following = np.where(following < 0, facets[:, :1], following)
+        start, end = facets[facets >= 0], following[facets >= 0]
         return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
 
 

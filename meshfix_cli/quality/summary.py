@@ -26,6 +26,7 @@ BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
 
 # The smallest angle of a triangle is at most 60 degrees, of a tetrahedron at most acos(1/3) = 70.5.
 BINS = {2: 12, 3: 15}
+WITHIN = 1 + 1e-9  # times a bound, whatever is rounded
 JACOBIAN_BINS = 20  # of scaled Jacobians from 0 to 1, where elements are not all simplices
 
 
@@ -323,19 +324,23 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
     Returns
     -------
     dict
-        "hausdorff", the distance between the two boundaries, see `Shapes.hausdorff`, in model units; "bound", within
-        which steps keep; "folds" of the reference, see `Shapes`; and by which share "size", the volume or area, and
-        "boundary", its area or length, have changed.
+        "hausdorff", the distance between the two boundaries, see `Shapes.hausdorff`, in model units; "deviation", that
+        of the middles of edges and triangles from the shape, "bound", within which steps keep it, and "beyond", how
+        many edges of curves and triangles are not within that; "folds" of the reference, see `Shapes`; and by which
+        share "size", the volume or area, and "boundary", its area or length, have changed.
     """
     shapes = after.freedom.shapes if after.freedom is not None else None
     if shapes is None:
-        return {"hausdorff": 0.0, "bound": 0.0, "folds": 0, "size": 0.0, "boundary": 0.0}
+        return dict.fromkeys(("hausdorff", "deviation", "bound", "beyond", "folds", "size", "boundary"), 0)
     points, there = before.along_curve(before.points), after.along_curve(after.points)
     facets = after.topology.facets_between(None)[0]
     (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
+    deviations = shapes.deviations(there, threads)
     return {
         "hausdorff": shapes.hausdorff(there, threads),
+        "deviation": float(deviations.max(initial=0)),
         "bound": shapes.bound,
+        "beyond": int((deviations > shapes.bound * WITHIN).sum()),
         "folds": shapes.folds,
         "size": _change(size, new_size),
         "boundary": _change(boundary, new_boundary),

@@ -308,8 +308,16 @@ def _jacobians(report: Report, row: Callable[..., Row]) -> Iterator[Row]:
 
 
 def _ceiling(report: Report, label: str) -> Iterator[Row]:
-    if report.ceiling is not None:
-        yield label, [""] * (len(report.stages) - 1) + [f"{report.ceiling:.3f}"]
+    facts, before = report.facts or {}, [""] * (len(report.stages) - 1)
+    slides = "ceiling_without_sliding" in facts
+    if slides or report.ceiling is not None:
+        yield label, [*before, _height(report.ceiling)]
+    if slides:
+        yield "the same, if nothing slid", [*before, _height(facts["ceiling_without_sliding"])]
+
+
+def _height(ceiling: float | None) -> str:
+    return "none" if ceiling is None else f"{ceiling:.3f}"
 
 
 def kind_rows(report: Report) -> tuple[list[str], list[Row]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -14,7 +14,7 @@ from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.mixed import MixedTopology
 from meshfix_cli.quality.formulas import evaluate
-from meshfix_cli.quality.summary import Summary, worst_first
+from meshfix_cli.quality.summary import WITHIN, Summary, worst_first
 from meshfix_cli.report.facts import Report, centroids, names
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
@@ -26,6 +26,9 @@ MOST_FACETS = 150_000  # of the boundary; above it is drawn on a grid, which has
 GRID = 512
 THINNEST = 1e-3  # extent of a picture, relative to the largest
 CREASE = 30.0  # degrees between two facets of the boundary, above which their edge is drawn
+
+# What facets are drawn as that are farther from their shape than a share of the deviation that is allowed.
+OFF = (("near", 0.1), ("off", 0.5), ("beyond", WITHIN))
 
 Points = NDArray[np.float64]
 Rows = NDArray[np.int32]
@@ -45,6 +48,9 @@ class State:
         Rows of `points`: all elements where they can all be drawn, those inverted, the worst (of the result alone).
     left_out : int
         Inverted elements that are not drawn.
+    off : dict of dict
+        Rows of `points`, too: facets on curved shapes where the boundary slides, by how far they have come off these,
+        see `OFF`.
     """
 
     points: Points
@@ -52,6 +58,7 @@ class State:
     inverted: Cells
     worst: Cells
     left_out: int
+    off: Mapping[str, Cells] = field(default_factory=dict)
 
     @property
     def drawn(self) -> int:
@@ -205,7 +212,8 @@ def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArr
         creases=np.empty((0, 2), dtype=np.int32) if coarse or mesh.dimension == 2 else _creases(boundary, facets),
         coarse=coarse,
         states={
-            name: drawn(mesh, inverted[name], worst if name == result else worst[:0]) for name, mesh in meshes.items()
+            name: _with_off(drawn(mesh, inverted[name], worst if name == result else worst[:0]), mesh)
+            for name, mesh in meshes.items()
         },
     )
 
@@ -257,6 +265,24 @@ def _partial_state(mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> Stat
     groups = [_numbered(mesh, some), _numbered(mesh, worst)]
     points, (wrong, worst_ones) = _compact(mesh.along_curve(mesh.points), groups)
     return State(points, {}, wrong, worst_ones, left_out=len(inverted) - len(some))
+
+
+def _with_off(state: State, mesh: Mesh) -> State:
+    """Return a state with the facets that have come off their shape; the farthest, where these are too many."""
+    shapes = None if mesh.freedom is None else mesh.freedom.shapes
+    if shapes is None:
+        return state
+    points = mesh.along_curve(mesh.points)
+    shares = shapes.deviations(points) / (shapes.bound or 1.0)
+    rows = np.flatnonzero(shapes.directions[shapes.shape] == mesh.dimension - 1)
+    rows = rows[np.argsort(-shares[rows], kind="stable")][:MOST_FACETS]
+    classes = np.searchsorted([least for _, least in OFF], shares[rows]) - 1
+    key = FACETS[mesh.dimension]
+    groups = [{key: shapes.vertices[rows[classes == i]]} for i in range(len(OFF))]
+    places, compact = _compact(points, groups)
+    off = [{key: cells[key] + len(state.points) for key in cells} for cells in compact]
+    names = (name for name, _ in OFF)
+    return replace(state, points=np.concatenate([state.points, places]), off=dict(zip(names, off, strict=True)))
 
 
 def _compact(points: Points, groups: Sequence[Cells]) -> tuple[Points, list[dict[str, Rows]]]:

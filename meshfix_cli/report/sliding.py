@@ -24,6 +24,13 @@ def _changed(shape: Mapping[str, Any], solid: bool) -> Iterator[str]:
         f"the boundary is within {shape['hausdorff']:.3g} of its shape (Hausdorff distance), its {boundary} changed by "
         f"{shape['boundary']:.2g} of itself, the {size} by {shape['size']:.2g}"
     )
+    if shape["beyond"]:
+        what = "facet" if solid else "edge"
+        far = counted(shape["beyond"], f"{what} is", f"{what}s are")
+        yield (
+            f"{far} farther from the shape than --max-deviation, {shape['bound']:.3g}, their middles by "
+            f"{shape['deviation']:.3g} at most: they left it while elements were inverted, and found no way back"
+        )
     if shape["folds"]:
         where = counted(shape["folds"], "edge" if solid else "vertex", "edges" if solid else "vertices")
         yield (

@@ -33,6 +33,10 @@ class Distance:
         """Return the length in model units of a mesh."""
         return self.value * (mesh.mean_edge_length(threads) if self.in_h else 1.0)
 
+    def on_boundary(self, mesh: Mesh) -> float:
+        """Return the length in model units, h that of the boundary, which no tangle inside changes."""
+        return self.value * (mesh.boundary_edge_length() if self.in_h else 1.0)
+
 
 def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple[Mesh, int]:
     """Move some interior vertices by a distance in random directions.

@@ -183,3 +183,47 @@ def test_the_shape_is_kept_as_well_as_it_is_asked_for(tmp_path: Path) -> None:
     smaller = "--slide", "curved", "--feature-angle", "5"
     report = json.loads(run("untangle", *smaller, "--json", SAMPLES / "plate_tangled.vtk", out).stdout)
     assert report["sliding"] == {"lines": 52, "planes": 0}
+
+
+def test_both_ceilings_are_shown_where_the_boundary_slides(tmp_path: Path) -> None:
+    """That without sliding is that of the input."""
+    out, bracket = tmp_path / "out.vtk", SAMPLES / "bracket_tangled.vtk"
+    held = json.loads(run("quality", "--json", bracket, code=3).stdout)["ceiling"]
+    for slide in ("flat", "curved"):
+        options = "--slide", slide
+        report = json.loads(run("untangle", *options, "--json", bracket, out).stdout)
+        assert report["ceiling_without_sliding"] == held
+        shown = "none" if report["ceiling"] is None else f"{report['ceiling']:.3f}"
+        assert shown == "none" if slide == "curved" else report["ceiling"] > held + 4
+        said = run("untangle", *options, bracket, out).stdout.decode().splitlines()
+        (with_it,) = (line for line in said if "ceiling set by" in line)
+        (without,) = (line for line in said if "if nothing slid" in line)
+        assert shown in with_it
+        assert f"{held:.3f}" in without
+
+
+def test_the_deviation_that_is_allowed_does_not_grow_with_the_tangle_inside(tmp_path: Path) -> None:
+    """A mean edge of the whole mesh does."""
+    bounds = []
+    for percent in (1, 80):
+        bad = tmp_path / "bad.vtk"
+        run("perturb", "--percent", percent, "--dist", "2h", SAMPLES / "bracket.vtk", bad)
+        done = run("untangle", "--slide", "curved", "--dry-run", "--json", bad)
+        bounds.append(json.loads(done.stdout)["shape"]["bound"])
+    assert bounds[0] == bounds[1] > 0
+
+
+def test_boundaries_are_tangled_on_their_surfaces_too(tmp_path: Path) -> None:
+    clean, bad, same = spheres(tmp_path)[0], tmp_path / "tangled.vtk", tmp_path / "same.vtk"
+    tangling = "perturb", "--percent", "50", "--dist", "1h"
+    run(*tangling, "--slide", "curved", clean, bad)
+    before, after = points_of(clean), points_of(bad)
+    outside, h = Mesh.build(*shell()).topology.boundary, Mesh.build(*shell()).mean_edge_length()
+    assert (before[outside] != after[outside]).any(axis=1).sum() > 100
+    off = np.linalg.norm(after[outside], axis=1) - np.linalg.norm(before[outside], axis=1)
+    assert np.abs(off).max() < 0.03 * h
+    run("untangle", "--slide", "curved", "--reference", clean, bad, same)
+    bracket = SAMPLES / "bracket.vtk"
+    run(*tangling, "--boundary", bracket, bad)
+    run(*tangling, "--slide", "flat", bracket, same)
+    assert bad.read_bytes() == same.read_bytes()

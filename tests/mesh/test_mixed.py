@@ -158,3 +158,18 @@ def test_the_mean_edge_length_is_that_of_the_distinct_edges(name: str) -> None:
     ends = np.array(sorted(edges))
     expected = np.linalg.norm(points[ends[:, 1]] - points[ends[:, 0]], axis=1).mean()
     np.testing.assert_allclose(Mesh.build(points, blocks).mean_edge_length(), expected, rtol=1e-12)
+
+
+@every
+def test_the_edge_length_of_the_boundary_is_that_of_its_facets_wherever_the_inside_is(name: str) -> None:
+    points, blocks = MESHES[name]()
+    shapes = {element.key: element.shape for element in JUDGED}
+    alone = {facet for facet, owners in faces_of(blocks).items() if len(owners) == 1}
+    facets = [[row[i] for i in one] for key, rows in blocks for row in rows.tolist() for one in shapes[key].facets]
+    sides = [side for one in facets if frozenset(one) in alone for side in zip(one, [*one[1:], one[0]], strict=True)]
+    start, end = np.array(sides).T
+    mesh = Mesh.build(points, blocks)
+    expected = np.linalg.norm(points[end] - points[start], axis=1).mean()
+    assert mesh.boundary_edge_length() == pytest.approx(expected, rel=1e-12)
+    moved = mesh.with_points(np.where(mesh.movable[:, None], points + 1.0, points))
+    assert moved.boundary_edge_length() == mesh.boundary_edge_length()

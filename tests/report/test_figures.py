@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from elements import MESHES
-from meshes import tangle
+from geometries import shell
+from meshes import sliding_on_curves, tangle
 from numpy.typing import NDArray
 from reports import FIRST, built, report_on, tangled
 from sampling import jacobians, measure
@@ -16,6 +17,7 @@ from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise, worst_first
 from meshfix_cli.report import figures
 from meshfix_cli.report.figures import Cells, Scene, convergence, number_of, scene
+from meshfix_cli.solve.perturb import perturb
 from meshfix_cli.solve.untangle import untangle
 
 FACTORIAL = {2: 2, 3: 6}
@@ -161,3 +163,24 @@ def test_convergence_is_that_of_the_records(bracket: Mesh) -> None:
     assert series.inverted[series.smoothing] == 0
     assert records[series.smoothing + 1].phase == "smoothing"
     assert convergence(records[: series.smoothing + 1]).smoothing is None
+
+
+def test_facets_that_have_come_off_their_shape_are_drawn_by_how_far() -> None:
+    """The distances of their middles from the boundary as it was are trimesh's."""
+    closest = pytest.importorskip("trimesh.proximity").closest_point_naive
+    trimesh = pytest.importorskip("trimesh")
+    valid = sliding_on_curves(Mesh.build(*shell()))
+    moved, _ = perturb(valid, 100, 0.3 * valid.mean_edge_length())
+    here, there = (drawn(one).states["mesh"] for one in (valid, moved))
+    assert not any(number_of(cells) for cells in here.off.values())
+    shape, shapes = drawn(valid), valid.freedom.shapes if valid.freedom else None
+    assert shapes is not None
+    was = trimesh.Trimesh(shape.boundary, shape.facets["triangle"], process=False)
+    least = np.array([share for _, share in figures.OFF] + [np.inf]) * shapes.bound
+    for i, cells in enumerate(there.off.values()):
+        corners = there.points[cells["triangle"]]
+        middles = [corners.mean(axis=1), *np.swapaxes((corners + np.roll(corners, 1, axis=1)) / 2, 0, 1)]
+        far = np.max([closest(was, some)[1] for some in middles], axis=0)
+        assert len(far) > 5
+        assert (far >= least[i] * (1 - 1e-9)).all()
+        assert (far <= least[i + 1] * (1 + 1e-9)).all()

@@ -434,3 +434,18 @@ def test_nothing_but_plain_graphics_is_in_the_file(written: dict[int, Path]) -> 
         assert len(content) < 150_000
         assert not re.findall(r"(?:https?:)?//[a-z]", re.sub(r"<script type.*?</script>", "", content, flags=re.DOTALL))
         assert "default-src 'none'" in content
+
+
+def test_facets_off_their_shape_are_drawn_where_the_boundary_slides(tmp_path: Path, visit: Open) -> None:
+    name, colours = tmp_path / "page.html", ("near", "off", "beyond")
+    options = "--slide", "curved", "--smooth", "best", "--dry-run", "--json", "--report", name
+    facts = json.loads(run("untangle", *options, TANGLED[3]).stdout)["shape"]
+    assert 0.5 * facts["bound"] < facts["deviation"] <= facts["bound"] * (1 + 1e-9)
+    assert facts["beyond"] == 0
+    last = [layer["role"] for layer in embedded(name, "scene")["layers"] if layer["stage"] == 2]
+    assert [role for role in colours if role in last] == ["near", "off"]
+    assert all(f'<i class="{role}">' in name.read_text() for role in colours)
+    with visit(name) as tab:
+        before, after = settled(tab), stage(tab, "smoothed")
+    blue = [(image[..., 2] > image[..., 0] + 40).sum() for image in (before, after)]
+    assert blue[1] > blue[0] + 1000

@@ -167,6 +167,10 @@ def _legend(report: Report, scene: Scene) -> str:
     count = number_of(list(scene.states.values())[-1].worst)
     worst = f"the worst {count}" if count > 1 else "the worst one"
     items = {"inverted": "inverted elements", "worst": f"{worst} of the {_result(report)}", "boundary": boundary}
+    if any(state.off for state in scene.states.values()):
+        facets = "facets" if scene.dimension == 3 else "edges"
+        shares = (("near", "a tenth of --max-deviation"), ("off", "half of it"), ("beyond", "all of it"))
+        items |= {style: f"{facets} off their shape by more than {share}" for style, share in shares}
     return "\n".join(f'<li><i class="{style}"></i>{words}</li>' for style, words in items.items())
 
 
@@ -292,6 +296,8 @@ def _scene(scene: Scene) -> dict[str, Any]:
         add("cells", state.cells, stage)
         add("inverted", state.inverted, stage)
         add("worst", state.worst, stage)
+        for role, cells in state.off.items():
+            add(role, cells, stage)
     return {
         "dimension": scene.dimension,
         "extent": (extent / np.linalg.norm(extent)).tolist(),

@@ -65,6 +65,7 @@
 
   const MOST_OUTLINED = 5000; // solids: the edges of more would hide their colour
   const MOST_EDGES = 30000; // of a boundary in space, for the same reason
+  const OFF = ["near", "off", "beyond"]; // the shape
   const STEP = Math.PI / 24;
   const NEAREST = 1e5;
   const START = { yaw: -0.6, pitch: 0.45, zoom: 1, centre: [0, 0, 0] };
@@ -304,6 +305,7 @@
       drawLines(layer, colour("inverted"), 1.2);
     }
     for (const layer of of("boundary")) drawLines(layer, colour("ink"), 1.6);
+    for (const role of OFF) for (const layer of of(role)) drawLines(layer, colour(role), 4);
   }
 
   function drawSolid(of, colour) {
@@ -312,6 +314,7 @@
     for (const layer of [...of("inverted"), ...of("worst")]) drawLines(layer, colour("ink", 0.7), 1);
     gl.depthMask(false);
     for (const layer of of("creases")) drawLines(layer, colour("ink", 0.55), 1.3);
+    for (const role of OFF) for (const layer of of(role)) drawFill(layer, colour(role, 0.35), 0, 1);
     for (const layer of of("boundary")) {
       drawLines(layer, colour("body", 0.16), 1);
       drawFill(layer, colour("body", 0.1), 0.45, 0);

@@ -44,8 +44,7 @@ class Compared:
         By how much each was better than the best before.
     """
 
-    def __init__(self, mesh: Mesh, elements: Judged, own: Mask, team: Team, threads: int, least: float) -> None:
-        self._least_measure = least  # of the corner simplices
+    def __init__(self, mesh: Mesh, elements: Judged, own: Mask, team: Team, threads: int) -> None:
         self._mesh, self._elements, self._own, self._team, self._threads = mesh, elements, own, team, threads
         self.best = np.empty(0)
         self.rises: list[float] = []
@@ -66,7 +65,7 @@ class Compared:
         if not self._will_do(figures):
             points = self._drawn_back(points, figures, vertices_of)
             values, figures = self._judged(points)
-            if not self._will_do(figures) or self._has_become_small(points):
+            if not self._will_do(figures):
                 self.rises.append(0.0)
                 return self._last
         if not self.rises:
@@ -82,13 +81,6 @@ class Compared:
     def stalls(self) -> bool:
         """Whether the last two, a turn, gained little."""
         return sum(max(rise, 0.0) for rise in self.rises[-2:]) < STALL
-
-    def _has_become_small(self, points: Array) -> bool:
-        """Whether the way back along surfaces has made a measure smaller than it may be, as none before does."""
-        freedom = self._mesh.freedom
-        if freedom is None or freedom.shapes is None:
-            return False
-        return self._team.least(self._elements.check(points, self._threads)[1]) < self._least_measure
 
     def _will_do(self, figures: Figures) -> bool:
         return all(one >= least - SAME for one, least in zip(figures, self._least, strict=True))

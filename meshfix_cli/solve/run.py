@@ -289,9 +289,7 @@ class Run(Positions):
             return False
         from meshfix_cli.solve.compared import Compared  # the formulas of metrics, which others do not need
 
-        self.compared = self.compared or Compared(
-            self.input, self.mendable, self.own, self.team, self.threads, self.min_measure
-        )
+        self.compared = self.compared or Compared(self.input, self.mendable, self.own, self.team, self.threads)
         return self._go_to(self.compared.add(self.points, self._of))
 
     def take_compared(self) -> bool:

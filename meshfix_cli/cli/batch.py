@@ -194,7 +194,7 @@ def batch(
     """
     from meshfix_cli.meshfile.atomic import write_text
     from meshfix_cli.report.as_json import batch_json
-    from meshfix_cli.report.facts import kept
+    from meshfix_cli.report.tally import kept
     from meshfix_cli.workers.batch import Task, run
 
     helpers.add("workers")
@@ -219,7 +219,7 @@ def batch(
 
 def _told(results: Iterator[Result], total: int, show: Show) -> Iterator[Result]:
     """Pass results through and print each, then their summary."""
-    from meshfix_cli.report.facts import Tally
+    from meshfix_cli.report.tally import Tally
     from meshfix_cli.report.terminal import console, print_result, print_tally, with_counts
 
     start, tally, out, plain = time.perf_counter(), Tally(), console(sys.stdout), not (show.quiet or show.as_json)

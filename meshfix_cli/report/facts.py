@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
@@ -31,9 +29,6 @@ _BEFORE_INVERTED = {
     "untangle": ("element remains", "elements remain"),
     "perturb": ("element is now", "elements are now"),
 }
-
-# What can become of a file of a batch, and how it is told.
-STATUSES = {"valid": "valid", "invalid": "NOT VALID", "failed": "failed", "skipped": "skipped"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,53 +117,6 @@ class Report:
     def listed(self) -> int | None:
         """How many elements are listed; None: all."""
         return None if self.everything else LISTED
-
-
-@dataclass
-class Tally:
-    """The results of a batch, see `batch.Task.result`, counted as they come.
-
-    Attributes
-    ----------
-    statuses : Counter
-    elements : int
-        Of the meshes that were read.
-    inverted : [int, int]
-        Before and after; files that were skipped count only after.
-    angle, jacobian : [float, float]
-        The worst of the smallest angles, degrees, and of the smallest scaled Jacobians: infinite where there are none.
-    """
-
-    statuses: Counter[str] = field(default_factory=Counter)
-    elements: int = 0
-    inverted: list[int] = field(default_factory=lambda: [0, 0])
-    angle: list[float] = field(default_factory=lambda: [math.inf, math.inf])
-    jacobian: list[float] = field(default_factory=lambda: [math.inf, math.inf])
-
-    def add(self, result: Mapping[str, Any]) -> None:
-        """Count one more."""
-        self.statuses[result["status"]] += 1
-        self.elements += result.get("elements", 0)
-        for i, summary in enumerate(before_and_after(result)):
-            if summary is not None:
-                self.inverted[i] += summary["inverted"]
-                if summary["min_angle"] is not None:
-                    self.angle[i] = min(self.angle[i], summary["min_angle"])
-                if "scaled_jacobian" in summary:
-                    self.jacobian[i] = min(self.jacobian[i], summary["scaled_jacobian"]["smallest"])
-
-
-def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """Return the first and the last summary of a result; what is not known is None."""
-    stages: dict[str, dict[str, Any]] = result.get("quality", {})
-    return stages.get("before"), next(reversed(stages.values()), None)
-
-
-def kept(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the report on a batch keeps of a result."""
-    names = ("file", "output", "status", "error", "seconds", "dimension", "elements", "vertices", "valid", "notes")
-    before, after = before_and_after(result)
-    return {**{name: result.get(name) for name in names}, "before": before, "after": after}
 
 
 @dataclass(frozen=True)

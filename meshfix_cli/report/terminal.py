@@ -16,10 +16,7 @@ from meshfix_cli.mesh.elements import MEASURES, counted, words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.report.as_json import to_json
 from meshfix_cli.report.facts import (
-    STATUSES,
     Report,
-    Tally,
-    before_and_after,
     binned,
     groups,
     kind_rows,
@@ -33,6 +30,7 @@ from meshfix_cli.report.facts import (
 )
 from meshfix_cli.report.plain import plain
 from meshfix_cli.report.sliding import sliding
+from meshfix_cli.report.tally import STATUSES, Tally, before_and_after
 
 if TYPE_CHECKING:
     from meshfix_cli.solve.records import SweepRecord

@@ -224,7 +224,7 @@ def test_what_no_free_node_changes_is_proved() -> None:
 def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.random.Generator) -> None:
     """Tetrahedra around one edge whose middle alone is free: proved where HiGHS finds no tangent either."""
     around = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
-    corners = np.concatenate([[[0, 0, 0], [0, 0, 1]], [*around, 0, 0, 0.5]])
+    corners = np.concatenate([[[0, 0, 0], [0, 0, 1]], around + np.array([0, 0, 0.5])])
     between = kernels.QUADRATIC_SHAPES[CODES["tetra10"]][1]
     numbers: dict[tuple[int, ...], int] = {}
     rows = []

@@ -20,7 +20,8 @@ from meshfix_cli.mesh.elements import counted
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.report.as_json import to_json
-from meshfix_cli.report.facts import Report, Tally, centroids, kind_rows, names, quality_rows, title, verdict
+from meshfix_cli.report.facts import Report, centroids, kind_rows, names, quality_rows, title, verdict
+from meshfix_cli.report.tally import Tally
 from meshfix_cli.report.terminal import console, print_report, print_result, print_tally
 from meshfix_cli.solve.untangle import untangle
 

@@ -179,27 +179,44 @@ struct QuadraticParts {
     }
 };
 
-// Whether det J is positive everywhere, and that is proved: the coefficients of parts of the element, each a half of another.
+// A part of an element, and how long its edges are in the parameters, where those of the whole have the length 1.
+template <int D>
+struct QuadraticPart {
+    QuadraticParts<D> parts;
+    std::array<double, 6> length2;  // for each way to halve
+
+    // The half by edge `k` in which the end `kept` stays and the other one is the middle.
+    QuadraticPart half(std::size_t k, int kept) const {
+        const auto& cut = parts.type->cut;
+        QuadraticPart found{{parts, parts.type->halves[k][kept]}, length2};
+        const int stays = cut[k][kept], moves = cut[k][1 - kept];
+        for (std::size_t i = 0; i < cut.size(); ++i) {
+            if (i == k || (cut[i][0] != moves && cut[i][1] != moves)) continue;
+            const int third = cut[i][0] == moves ? cut[i][1] : cut[i][0];
+            for (std::size_t j = 0; j < cut.size(); ++j)  // a median of the triangle of the three
+                if ((cut[j][0] == stays && cut[j][1] == third) || (cut[j][0] == third && cut[j][1] == stays))
+                    found.length2[i] = 0.5 * (length2[i] + length2[j]) - 0.25 * length2[k];
+        }
+        found.length2[k] = 0.25 * length2[k];
+        return found;
+    }
+};
+
+// Whether det J is positive everywhere, and that is proved: the coefficients of parts of the element, each a half of another,
+// by the edge that is longest in the parameters.
 template <int D>
 bool is_positive(const QuadraticParts<D>& whole) {
-    std::vector<QuadraticParts<D>> waiting{whole};
     const QuadraticType& type = *whole.type;
+    std::vector<QuadraticPart<D>> waiting{{whole, {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}}};
     for (int seen = 0; !waiting.empty(); ++seen) {
-        const QuadraticParts<D> part = waiting.back();
+        const QuadraticPart<D> part = waiting.back();
         waiting.pop_back();
-        if (part.smallest() > part.doubt()) continue;
+        if (part.parts.smallest() > part.parts.doubt()) continue;
         for (const int corner : type.corner_coefficient)
-            if (!(part.coefficient[corner] > 0.0)) return false;
+            if (!(part.parts.coefficient[corner] > 0.0)) return false;
         if (seen == QUADRATIC_PARTS) return false;
-        std::size_t longest = 0;
-        double length2 = -1.0;
-        for (std::size_t k = 0; k < type.cut.size(); ++k) {
-            const double there = norm2(part.control[type.cut[k][1]] - part.control[type.cut[k][0]]);
-            if (!(there > length2)) continue;
-            longest = k;
-            length2 = there;
-        }
-        for (const auto& half : type.halves[longest]) waiting.emplace_back(part, half);
+        const auto longest = std::max_element(part.length2.begin(), part.length2.begin() + type.cut.size()) - part.length2.begin();
+        for (int kept = 0; kept < 2; ++kept) waiting.push_back(part.half(static_cast<std::size_t>(longest), kept));
     }
     return true;
 }

@@ -86,7 +86,7 @@ class QuadraticType {
     std::vector<std::uint32_t> depends;          // for each coefficient the nodes that it depends on, as bits
     std::vector<std::array<Sum, 3>> at_node;     // for each node the derivative along each direction: sums of differences
     std::vector<std::array<std::vector<Sum>, 2>> halves;   // the control points of both halves, for each way to halve
-    std::vector<std::array<int, 2>> cut;                   // the corners that are the ends of an edge that is halved so
+    std::vector<std::array<int, 2>> cut;                   // the barycentric coordinates of both ends of the edge that is halved so
 
     explicit QuadraticType(const QuadraticShape& shape)
         : dimension(shape.dimension), nodes(static_cast<int>(shape.between.size())), weight(shape.weight),
@@ -357,7 +357,7 @@ class QuadraticType {
                 for (int b = a + 1; b <= n; ++b) {
                     const int one = static_cast<int>(at) + a, other = static_cast<int>(at) + b;
                     halves.push_back({half(one, other), half(other, one)});
-                    cut.push_back(edge_along(one, other));
+                    cut.push_back({one, other});
                 }
             at += n + 1;
         }
@@ -374,16 +374,6 @@ class QuadraticType {
                 here = {{number, 0.25}, {control_.at(plus(plus(without, kept), moved)), 0.5}, {control_.at(plus(without, kept, 2)), 0.25}};
         }
         return found;
-    }
-
-    // The control points of two corners that differ in this alone.
-    std::array<int, 2> edge_along(int one, int other) const {
-        for (const Index& corner : corner_index_)
-            if (corner[one] == 1) {
-                Index there = plus(plus(corner, one, -1), other);
-                return {control_.at(sum(corner, corner)), control_.at(sum(there, there))};
-            }
-        return {0, 0};
     }
 };
 

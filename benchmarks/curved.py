@@ -56,7 +56,7 @@ def repaired(document: Document, smooth: Any = "auto") -> tuple[int, float, floa
     note = ""
     if left:
         proved = len(outcome.obstacles.inverted) + len(outcome.obstacles.exclusive)
-        way = giving_way(outcome.after, math.inf, 1)
+        way = giving_way(outcome.after, document.mesh.points, math.inf, 1)
         far = "none" if way is None else f"{way[1] / document.mesh.mean_edge_length():.3f}h"
         note = f"{proved} proved; relax {far}"
     return left, smallest, seconds, note

@@ -165,7 +165,7 @@ class Method:
 
     def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
         """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
-        if self.slide == "none":
+        if self.slide == "none" or document.mesh.quadratic is not None:  # corners and nodes would part
             return document
         from meshfix_cli.meshfile.sliding import slid
 
@@ -434,11 +434,11 @@ def _of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, thre
 
     assert after.quadratic is not None
     ways = np.linalg.norm(after.points - before.points, axis=1)[after.quadratic.giving]
-    if (ways > 0).any():
+    if curving == "relax" and (ways > 0).any():
         count = counted(int((ways > 0).sum()), "curved node of the boundary", "curved nodes of the boundary")
         far = f"{ways.max():.3g} ({ways.max() / before.mean_edge_length():.2g}h)"
         return (f"--curving relax moved {count} by at most {far}",)
-    found = giving_way(after, reach, threads) if curving == "hold" and after.check(threads)[0] else None
+    found = giving_way(after, before.points, reach, threads) if curving == "hold" and after.check(threads)[0] else None
     if found is None:
         return ()
     many = counted(found[0], "curved node of the boundary", "curved nodes of the boundary")
@@ -462,6 +462,8 @@ def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mes
     """
     nothing = "no element that is judged" if document.not_judged else "no element"
     none = "no angle" if document.mesh.topology.simplicial else "none"
+    if document.mesh.quadratic is not None and outcome.after is outcome.before and outcome.valid:
+        return (f"{nothing} is inverted, and no coefficient is small: nothing was moved",)
     if outcome.after is outcome.before and outcome.valid:
         if len(outcome.records) > 1:
             return (f"{nothing} is inverted and {none} could be made better: nothing was moved",)

@@ -173,7 +173,13 @@ class Mesh:
         wrong[self.topology.connectivity.rows[inverted]] = True
         judgement = self.quadratic.judge(self.points, threads)
         wrong[self.quadratic.rows] = judgement.verdicts != VALID
-        return int(wrong.sum()), float(judgement.measures.min())
+        smallest = float(judgement.measures.min())
+        if len(self.quadratic) < self.topology.m:
+            others = np.delete(self.topology.positions, self.quadratic.rows)
+            smallest = min(
+                smallest, Judged(self.topology.connectivity, others).check(self.along_curve(self.points), threads)[1]
+            )
+        return int(wrong.sum()), smallest
 
     def stuck(self, threads: int = 1) -> NDArray[np.int32]:
         """Return the rows (k,), in the order of the connectivity, of the elements that have no free vertex."""

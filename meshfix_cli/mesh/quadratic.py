@@ -16,6 +16,8 @@ from meshfix_cli.mesh.elements import ELEMENTS
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+BENT = 1e-6  # of an element's size, by which its nodes may lie off and it is straight
+
 # The types that are judged by the Bezier coefficients of their nodes, in the order of the kernels' numbers for them.
 SECOND_ORDER = tuple(
     ELEMENTS[key]
@@ -137,6 +139,15 @@ class Quadratic:
         for nodes, ends in self.between:
             found[nodes] = points[ends].mean(axis=1)
         return found
+
+    def bent(self, points: Array) -> Mask:
+        """Mark the elements (m,) that have a node off the place where the straight element has it, beyond rounding."""
+        off = np.linalg.norm(points - self.straight(points), axis=1)
+        off[~self.used] = 0.0
+        first = np.add.reduceat(points[self.nodes], self.offsets[:-1]) / np.diff(self.offsets)[:, None]
+        apart = points[self.nodes] - np.repeat(first, np.diff(self.offsets), axis=0)
+        size = np.maximum.reduceat(np.linalg.norm(apart, axis=1), self.offsets[:-1])
+        return np.asarray(np.maximum.reduceat(off[self.nodes], self.offsets[:-1]) > BENT * size)
 
     def follow(self, before: Array, after: Array) -> Array:
         """Return points (n, d) whose corners have moved, with other nodes moved by the mean of their corners' ways."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, listed
-from meshfix_cli.mesh.elements import counted, words
+from meshfix_cli.mesh.elements import ELEMENTS, counted, words
 from meshfix_cli.mesh.quadratic import SECOND_ORDER, Quadratic
 from meshfix_cli.meshfile.solved import Part
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.ties import Ties
 
 Mask = NDArray[np.bool_]
+OFF_PLANE = 1e-6  # of the size of a plane mesh, by which its nodes may lie off
+# Nodes beside corners that elements with a node in each face have.
+_COMPLETE = {"wedge": 12, "hexahedron": 19}
 
 
 def quadratic_of(
@@ -52,8 +55,9 @@ def quadratic_of(
     """
     _check(parts, curved)
     blocks, rows, start = [], [], 0
-    other = held.copy()
+    other = held | _alike(ties)
     for part in parts:
+        other[_lacking(part, ties)] = True
         here = np.arange(start, start + len(part.vertices))
         start += len(part.vertices)
         if not _is_judged(part):
@@ -68,6 +72,53 @@ def quadratic_of(
     between = _on_facets(mesh, ties, regions)
     quadratic = Quadratic(blocks, mesh.topology.n, np.concatenate(rows))
     return quadratic.holding(boundary | between | on_cells | other, boundary & ~other)
+
+
+def check_plane(
+    places: NDArray[np.floating], points: NDArray[np.float64], basis: NDArray[np.float64], ties: Ties
+) -> None:
+    """Refuse nodes off the plane of the corners.
+
+    Parameters
+    ----------
+    places : (n, 3) float
+        In the coordinates of the file.
+    points : (n, 2) float64
+        In the plane that the basis (2, 3) spans.
+    ties : Ties
+    """
+    nodes = np.flatnonzero(ties.nodes)
+    corner = np.unique(np.concatenate([tie.corners.ravel() for tie in ties.groups]))
+    normal = np.cross(*basis)
+    heights = places.astype(np.float64) @ normal
+    size = float(np.ptp(points[corner], axis=0).max())
+    rounding = 8 * float(np.finfo(places.dtype).eps) * float(np.abs(places[corner]).max())
+    low, high = heights[corner].min() - OFF_PLANE * size - rounding, heights[corner].max() + OFF_PLANE * size + rounding
+    off = int(((heights[nodes] < low) | (heights[nodes] > high)).sum())
+    if off:
+        raise ReadError(
+            f"{counted(off, 'node', 'nodes')} between corners {'is' if off == 1 else 'are'} not in their plane"
+        )
+
+
+def _alike(ties: Ties) -> Mask:
+    """Mark the nodes (n,) that lie between the same corners as others: two sides of a seam, which must not part."""
+    mask = np.zeros(ties.n, dtype=bool)
+    for tie in ties.groups:
+        number, counts = np.unique(tie.corners, axis=0, return_inverse=True, return_counts=True)[1:]
+        mask[tie.nodes[counts[number.reshape(-1)] > 1]] = True
+    return mask
+
+
+def _lacking(part: Part, ties: Ties) -> NDArray[np.integer]:
+    """Return nodes (k,) on edges and faces of elements that do not have them: there they must stay in the middle."""
+    shape = ELEMENTS[part.key].shape
+    some = [np.empty(0, dtype=np.int32)] if part.nodes is not None else [
+        _found(ties, part.vertices[:, list(ends)]) for edges in shape.parallel for ends in edges
+    ]  # fmt: skip
+    if part.nodes is None or part.refined is None or len(part.refined.weights) < _COMPLETE.get(part.key, 0):
+        some += [_found(ties, part.vertices[:, list(facet)]) for facet in shape.facets if len(facet) == 4]
+    return np.concatenate(some)
 
 
 def _is_judged(part: Part) -> bool:

@@ -264,14 +264,20 @@ def build(
     if ties is not None:
         held[HALFWAY] = ties.nodes & topology.used
     if ties is not None and curved.any():
-        from meshfix_cli.meshfile.curving import quadratic_of
+        from meshfix_cli.meshfile.curving import check_plane, quadratic_of
 
+        if topology.m < solved.m:
+            raise ReadError(
+                "elements are curved and some are repeated: which of them have other nodes is not looked at"
+            )
+        if basis is not None:
+            check_plane(source.points, points, basis, ties)
         parts = solved.some(topology.source)
         asked = np.logical_or.reduce([mask for reason, mask in held.items() if reason != ON_CELLS])
         masks = asked, held[ON_CELLS]
         quadratic = quadratic_of(parts, curved[topology.source], mesh, ties, between, *masks)
         mesh = replace(mesh, quadratic=quadratic)
-    elif ties is not None:
+    if ties is not None:
         held = {reason: ties.with_corners(mask) for reason, mask in held.items()}
     holds |= held
     for mask in holds.values():

@@ -17,7 +17,9 @@ from meshfix_cli.meshfile.solved import Solved
 if TYPE_CHECKING:
     from meshfix_cli.mesh.ties import Ties
 
-_CURVED = "elements are curved, and are judged so; angles, and their ceiling, are those of the straight ones"
+_CURVED = (
+    "elements are curved, and are judged so; angles and ceilings are those of straight ones, and curved facets may meet"
+)
 
 
 def notes_on(

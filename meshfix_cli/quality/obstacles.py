@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,7 +89,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         Each simplex, and each pair, once and in ascending order: the same for any number of threads.
     """
     if mesh.quadratic is not None:
-        return _of_curved(mesh, mesh.quadratic)
+        return _of_curved(mesh, mesh.quadratic, threads)
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     movable = mesh.along_curve(mesh.movable)
     corners = kernels.check(points, connectivity.simplices, threads)[0]
@@ -110,8 +110,8 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     )
 
 
-def _of_curved(mesh: Mesh, quadratic: Quadratic) -> Obstacles:
-    """Return what is proved at corners of curved elements; whether curved facets meet is not looked at.
+def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
+    """Return what is proved at corners of curved elements, and where straight ones meet: of others that is not known.
 
     Inverted are those whose determinant at a corner no free node changes; they exclude each other where all have a free
     edge in common, and no tangent of it makes them valid at its end.
@@ -119,8 +119,11 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic) -> Obstacles:
     free = mesh.movable | quadratic.free
     proofs = quadratic.kernel.impossible(mesh.points, free.astype(np.uint8))
     alone, together = (np.sort(quadratic.rows[proofs == mark]).astype(np.int32) for mark in (1, 2))
-    none = np.empty((0, 2), dtype=np.int32)
-    return Obstacles(alone, together, none, none, none[:, 0])
+    straight = find_obstacles(replace(mesh, quadratic=None), threads)
+    bent = np.zeros(mesh.topology.m, dtype=bool)
+    bent[quadratic.rows] = quadratic.bent(mesh.points)
+    crossing, folding = (pairs[~bent[pairs].any(axis=1)] for pairs in (straight.crossing, straight.folding))
+    return Obstacles(alone, together, crossing, folding, straight.overlapping[~bent[straight.overlapping]])
 
 
 def _meeting(

@@ -181,7 +181,7 @@ def _with_curved(straight: Summary, mesh: Mesh, quadratic: Quadratic, threads: i
         scaled_jacobian=float(found.scaled_jacobians.min()),
     )
     inverted = np.flatnonzero(wrong).astype(np.int32)
-    least = float(found.measures.min())
+    least = mesh.check(threads)[1]
     return replace(straight, inverted=len(inverted), inverted_elements=inverted, min_measure=least, curved=curved)
 
 
@@ -276,6 +276,8 @@ def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: in
         badness = -mesh.topology.of_rows(judged.angles(mesh.along_curve(mesh.points), threads))
     else:
         badness = -evaluate("scaled_jacobian", mesh)
+    if mesh.quadratic is not None:
+        badness[mesh.quadratic.rows] = -np.minimum(mesh.quadratic.judge(mesh.points, threads).smallest, 1.0)
     badness[inverted] += 2 * math.pi
     return np.argsort(-badness, kind="stable")[:count]
 

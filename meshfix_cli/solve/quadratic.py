@@ -37,6 +37,7 @@ POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far 
 STEP, LEAST_STEP = 0.1, 0.02  # of the floor
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
+RELAXING_RINGS = (1,)
 RELAXED = 0.1  # share of the way to the middle by which held nodes give way at a time
 HALVINGS = 5  # that look for a smaller share
 
@@ -99,7 +100,8 @@ class _Run:
         self.left, self.smallest = int(self.invalid.sum()), float(found.smallest.min(initial=math.inf))
 
     def _rank(self) -> tuple[int, float]:
-        return self.left, -self.smallest
+        """Smaller is better: fewer invalid elements, then larger coefficients of those that depend on a free node."""
+        return self.left, -float(self._smallest(self.free, of_free=True).min(initial=math.inf))
 
     def _try(self, name: str, points: Array) -> Iterator[Step]:
         """Take points if they are better."""
@@ -111,26 +113,26 @@ class _Run:
         else:
             self.points, self.left, self.smallest, self.invalid, self.low = before
 
-    def untangle(self) -> Iterator[Step]:
-        """Look for valid positions."""
-        yield from self._programmes()
-        for rings in RINGS:
-            if self.left:
-                region = self.free & self.mesh.near(self.low, rings)
-                yield from self._minimise(region)
+    def untangle(self, regions: tuple[int, ...] = RINGS) -> Iterator[Step]:
+        """Look for valid positions: of the nodes between corners, and where these do not suffice of corners as well."""
+        for free in (self.free & ~self.mesh.corners, self.free):
+            yield from self._programmes(free)
+            for rings in regions:
+                if self.left:
+                    yield from self._minimise(free & self.mesh.near(self.low, rings))
 
-    def _programmes(self) -> Iterator[Step]:
+    def _programmes(self, free: Mask) -> Iterator[Step]:
         """Sweeps of the linear programme over the nodes of elements that are not certified; the best ones are kept."""
         corners, points, low = self.mesh.corners, self.points, self.low
         best = (int(low.sum()), points)
         for _ in range(CYCLES):
-            if self.left == 0 or not low.any():
-                break
-            near = self.free & self.mesh.of(low)
-            for nodes, tied in ((near & ~corners, False), (near & corners, True)):
+            for some, tied in ((~corners, False), (corners, True)):
+                nodes = free & some & self.mesh.of(low)
+                if self.left == 0 or not nodes.any():
+                    continue
                 points = self._relocated(points, nodes, tied)
-            low = self.mesh.judge(points, self.limits.threads).smallest <= 0
-            best = min(best, (int(low.sum()), points), key=lambda one: one[0])
+                low = self.mesh.judge(points, self.limits.threads).smallest <= 0
+                best = min(best, (int(low.sum()), points), key=lambda one: one[0])
         if best[1] is not self.points:
             yield from self._try(PROGRAMMES, best[1])
 
@@ -158,7 +160,7 @@ class _Run:
             eps *= SHRINK
 
     def raise_to(self, highest: float) -> Iterator[Step]:
-        """Raise the smallest coefficients, those of nodes first; no floor is above what held nodes set."""
+        """Raise the smallest coefficients, those of nodes first; elements that held nodes keep low are left out."""
         inner = self.free & ~self.mesh.corners
         yield from self._raise(inner, highest)
         if self.smallest < POOR or highest == 1:
@@ -168,10 +170,10 @@ class _Run:
         step = floor = STEP
         while floor < highest and step >= LEAST_STEP:
             self.rest, self.sizes = self.points, self.mesh.kernel.sizes(self.points, self.limits.threads)
-            ceiling = self._smallest(free, of_free=False).min(initial=math.inf)
-            low = self._smallest(free, of_free=True) <= floor
-            if floor >= ceiling:
+            stuck = self._smallest(free, of_free=False) <= floor
+            if stuck.all():
                 return
+            low = ~stuck & (self._smallest(free, of_free=True) <= floor)
             raised = None if low.any() else self.points
             for rings in RAISING_RINGS:
                 if raised is None:
@@ -217,22 +219,24 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
     """
     share = np.zeros(mesh.n)
     way = mesh.straight(points) - points
-    held = held & ~limits.free & (np.abs(way).max(axis=1) > 0)
+    far = np.linalg.norm(way, axis=1)
+    most_of = np.minimum(1.0, limits.max_move / np.maximum(far, np.finfo(float).tiny))  # of the way, for each
+    held = held & ~limits.free & (far > 0)
 
     def solved(start: Array, shares: Array) -> tuple[Array, Mask]:
         moved = start.copy()
         moved[held] = points[held] + shares[held, None] * way[held]
         run = _Run(mesh, moved, limits)
-        for _ in run.untangle():
+        for _ in run.untangle(RELAXING_RINGS):
             pass
         return run.points, run.invalid
 
     found, invalid = solved(points, share)
     while invalid.any():
-        giving = held & mesh.of(invalid) & (share < 1)
+        giving = held & mesh.of(invalid) & (share < most_of)
         if not giving.any():
             return None
-        share[giving] = np.minimum(share[giving] + RELAXED, 1.0)
+        share[giving] = np.minimum(share[giving] + RELAXED, most_of[giving])
         found, invalid = solved(found, share)
     least, most = 0.0, 1.0
     for _ in range(HALVINGS):
@@ -271,6 +275,7 @@ def curved_steps(
     clock = _Clock(mesh, threads)
     yield mesh, clock.record("input", mesh)
     best, rank = mesh, mesh.check(threads)
+    found = [mesh]
     if _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
@@ -280,11 +285,14 @@ def curved_steps(
     limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, mesh.points, max_move, threads)
     candidates = [best] if best is mesh or best.check(threads)[0] < rank[0] else [best, mesh]
     for start in candidates:
+        best = start
         for name, points in steps(quadratic, start.points, limits, floor):
             best = start.with_points(points)
             yield best, clock.record(name, best)
         if best.check(threads)[0] == 0:
             return
+        found.append(best)
+    best = min(found, key=lambda one: _rank(one, threads))
     if relax:
         given = relaxed(quadratic, best.points, limits, quadratic.giving)
         if given is not None:
@@ -293,11 +301,17 @@ def curved_steps(
             for name, points in steps(quadratic, given, limits, floor):
                 best = best.with_points(points)
                 yield best, clock.record(name, best)
-    if best.check(threads)[0] > rank[0]:
-        yield mesh, clock.record("best", mesh)
+    if clock.points is not best.points:
+        yield best, clock.record("best", best)
 
 
-def giving_way(mesh: Mesh, max_move: float, threads: int) -> tuple[int, float] | None:
+def _rank(mesh: Mesh, threads: int) -> tuple[int, float]:
+    """Return how good a mesh is: the smaller the better."""
+    assert mesh.quadratic is not None
+    return mesh.check(threads)[0], -float(mesh.quadratic.judge(mesh.points, threads).smallest.min())
+
+
+def giving_way(mesh: Mesh, start: Array, max_move: float, threads: int) -> tuple[int, float] | None:
     """Return how many nodes of the boundary would give way, and by how much at most; None: that is no use.
 
     See `relaxed`.
@@ -306,12 +320,14 @@ def giving_way(mesh: Mesh, max_move: float, threads: int) -> tuple[int, float] |
     ----------
     mesh : Mesh
         As near to valid as it comes.
+    start : (n, d) float64
     max_move : float
     threads : int
+        See `Limits`.
     """
     quadratic = mesh.quadratic
     assert quadratic is not None
-    limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, mesh.points, max_move, threads)
+    limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, start, max_move, threads)
     found = relaxed(quadratic, mesh.points, limits, quadratic.giving)
     if found is None:
         return None

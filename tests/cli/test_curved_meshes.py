@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from commands import MESHFIX, error_line, run
 from geometries import grid
+from numpy.typing import NDArray
 from places import MPIEXEC, needs_mpi
 from programs import gmsh_session
 from refined import SERENDIPITY, refined
@@ -154,3 +155,98 @@ def test_meshes_around_round_things_become_valid_or_that_is_impossible(tmp_path:
                 moved = np.linalg.norm(relaxed.after.points - mesh.points, axis=1)[~mesh.quadratic.free & ~mesh.movable]
                 assert moved.max() < 0.2 * mesh.mean_edge_length(), name
     assert sum(before > 0 for _, before, _ in seen) >= 2, seen
+
+
+SQUARE, TRIANGLES = grid(*[np.linspace(0, 1, 5)] * 2)
+
+
+def plate(path: Path, kinds: tuple[str, ...] = ("triangle",), seam: bool = False, height: float = 0.0) -> Path:
+    """Write a square of second order, of linear triangles beyond the middle if asked, whose inner nodes are moved."""
+    left = SQUARE[TRIANGLES].mean(axis=1)[:, 0] < 0.5
+    points, blocks = refined(SQUARE, [("triangle", TRIANGLES if len(kinds) == 1 else TRIANGLES[left])], ON_TOP)
+    inside = np.asarray(((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1))
+    inside[: len(SQUARE)] = False
+    inside &= ~np.isclose(points[:, 0], 0.5)
+    points = np.column_stack([points, np.zeros(len(points))])
+    points[inside, :2] += np.random.default_rng(4).uniform(-0.25, 0.25, (int(inside.sum()), 2))
+    points[inside, 2] += height
+    if len(kinds) > 1:
+        blocks.append(("triangle", TRIANGLES[~left]))
+    if seam:  # each element has nodes of its own between corners
+        rows = blocks[0][1]
+        own = len(SQUARE) + np.arange(3 * len(rows)).reshape(-1, 3)
+        points = np.concatenate([points[: len(SQUARE)], points[rows[:, 3:]].reshape(-1, 3)])
+        blocks = [("triangle6", np.column_stack([rows[:, :3], own]))]
+    meshio.Mesh(points, blocks).write(path)
+    return path
+
+
+def moved(source: Path, target: Path) -> NDArray[np.float64]:
+    return np.linalg.norm(meshio.read(target).points - meshio.read(source).points, axis=1)
+
+
+def test_nodes_alone_are_mended_by_nodes_alone(tmp_path: Path) -> None:
+    """Corners that are well stay."""
+    source = plate(tmp_path / "in.vtu")
+    assert report("quality", source, code=3)["inverted"]
+    run("untangle", source, tmp_path / "out.vtu")
+    assert not moved(source, tmp_path / "out.vtu")[: len(SQUARE)].any()
+
+
+def test_held_nodes_stay_where_corners_are_tangled(tmp_path: Path) -> None:
+    source = plate(tmp_path / "in.vtu")
+    mesh = meshio.read(source)
+    held = np.arange(len(mesh.points)) == len(SQUARE) + 20
+    free = ((SQUARE > 0) & (SQUARE < 1)).all(axis=1)
+    mesh.points[: len(SQUARE)][free, :2] += np.random.default_rng(5).uniform(-0.3, 0.3, (int(free.sum()), 2))
+    mesh.point_data["hold"] = held.astype(np.int32)
+    mesh.write(source)
+    run("untangle", "--allow-inverted", "--fix", "hold", source, tmp_path / "out.vtu")
+    assert not moved(source, tmp_path / "out.vtu")[held].any()
+    assert moved(source, tmp_path / "out.vtu").any()
+
+
+def test_elements_do_not_part(tmp_path: Path) -> None:
+    """Nodes on two sides of a seam stay, and those on edges of elements that do not have them."""
+    source = plate(tmp_path / "seam.vtu", seam=True)
+    run("untangle", "--allow-inverted", source, tmp_path / "out.vtu")
+    assert not moved(source, tmp_path / "out.vtu")[len(SQUARE) :].any()
+    source = plate(tmp_path / "mixed.vtu", kinds=("triangle6", "triangle"))
+    run("untangle", "--allow-inverted", source, tmp_path / "out.vtu")
+    points = meshio.read(source).points
+    between = np.isclose(points[:, 0], 0.5)
+    assert between.sum() > 5
+    assert not moved(source, tmp_path / "out.vtu")[between].any()
+
+
+def test_nodes_off_the_plane_and_repetitions_are_refused(tmp_path: Path) -> None:
+    line = error_line("quality", plate(tmp_path / "in.vtu", height=0.1))
+    assert "between corners are not in their plane" in line
+    source = plate(tmp_path / "in.vtu")
+    mesh = meshio.read(source)
+    rows = mesh.cells[0].data
+    other = rows[:1].copy()
+    other[0, 3:] = rows[5, 3:]
+    meshio.Mesh(mesh.points, [("triangle6", np.concatenate([rows, other]))]).write(source)
+    assert "some are repeated" in error_line("quality", source)
+
+
+def test_straight_parts_that_overlap_are_named_beside_curved_ones(tmp_path: Path) -> None:
+    corners = np.array([[0, 0], [4, 0], [0, 4], [0.5, 0.5], [1, 0.5], [0.5, 1]], dtype=float)
+    points, blocks = refined(corners, [("triangle", np.arange(6, dtype=np.int32).reshape(2, 3))], ON_TOP)
+    points = np.column_stack([points, np.zeros(len(points))])
+    points[6, 1] -= 0.1
+    meshio.Mesh(points, blocks).write(tmp_path / "in.vtu")
+    assert report("quality", tmp_path / "in.vtu", code=3)["obstacles"]["overlapping"]  # type: ignore[index]
+
+
+def test_what_gives_way_keeps_to_how_far_it_may_go(tmp_path: Path) -> None:
+    source = plate(tmp_path / "in.vtu")
+    mesh = meshio.read(source)
+    left = np.isclose(mesh.points[:, 0], 0) & (np.arange(len(mesh.points)) >= len(SQUARE))
+    mesh.points[left, 0] += 1.5
+    mesh.write(source)
+    run("untangle", "--allow-inverted", "--curving", "relax", "--max-move", "0.05", source, tmp_path / "near.vtu")
+    assert moved(source, tmp_path / "near.vtu").max() <= 0.05
+    run("untangle", "--curving", "relax", source, tmp_path / "out.vtu")
+    assert 0.05 < moved(source, tmp_path / "out.vtu")[left].max() < 1.5

@@ -128,13 +128,14 @@ def _is_judged(part: Part) -> bool:
 def _check(parts: Sequence[Part], curved: Mask) -> None:
     """Refuse curved elements of types that are not judged."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)]).tolist()
-    counts = {part.type: 0 for part in parts if not _is_judged(part)}
+    counts: dict[str, int] = {}
     for part, begin, end in zip(parts, starts, starts[1:], strict=False):
-        if part.type in counts:
-            counts[part.type] += int(curved[begin:end].sum())
-    named = listed([counted(count, *words(kind)) for kind, count in counts.items() if count])
-    if named:
-        raise ReadError(f"{named} of {counted(len(curved), 'element', 'elements')} are curved, which are not judged")
+        if not _is_judged(part) and curved[begin:end].any():
+            counts[part.type] = counts.get(part.type, 0) + int(curved[begin:end].sum())
+    if counts:
+        count, named = sum(counts.values()), listed([words(kind)[1] for kind in counts])
+        some = f"{count:,} of {counted(len(curved), 'element', 'elements')} {'is' if count == 1 else 'are'} curved"
+        raise ReadError(f"{some} ({named}): elements of such types are judged where they are straight")
 
 
 def _on_facets(mesh: Mesh, ties: Ties, regions: Iterable[NDArray[np.int64] | None]) -> Mask:

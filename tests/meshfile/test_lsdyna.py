@@ -96,13 +96,14 @@ def read_text(folder: Path, text: str):  # type: ignore[no-untyped-def]
     return read(folder / "in.k")
 
 
-def test_a_curved_element_among_others_is_refused(tmp_path: Path) -> None:
+def test_a_curved_element_among_others_is_judged_as_such(tmp_path: Path) -> None:
     points, blocks = MESHES["every solid"]()
     tetra = dict(blocks)["tetra"]
     text = "".join(cards(i, 1) + cards(*row, *[row[-1]] * 4) for i, row in enumerate((tetra + 1).tolist(), 1))
     text += cards(9999, 1) + cards(*range(1, 11))
-    with pytest.raises(ReadError, match=rf"1 of {len(tetra) + 1} elements is curved \(tetrahedra of 10 nodes\)"):
-        read_text(tmp_path, f"*KEYWORD\n*NODE\n{nodes(points)}*ELEMENT_SOLID\n{text}*END\n")
+    document = read_text(tmp_path, f"*KEYWORD\n*NODE\n{nodes(points)}*ELEMENT_SOLID\n{text}*END\n")
+    assert document.mesh.quadratic is not None
+    assert document.ids[document.mesh.quadratic.rows].tolist() == [9999]
 
 
 @pytest.mark.parametrize("key", ["quad8", "tetra10"])

@@ -107,8 +107,8 @@ BODIES: dict[str, Body] = {
     **{f"pipe {wall}": pipe(wall, size) for wall, size in ((0.05, 0.4), (0.1, 0.5), (0.2, 0.6))},
     **{f"ball {size}": ball(size) for size in (0.7, 1.2)},
     **{f"cube, {n} bubbles of {r}": bubbles(n, r, h) for n, r, h in ((1, 0.1, 0.5), (4, 0.1, 0.4), (8, 0.2, 0.5))},
-    **{f"torus {tube}": torus(tube, size) for tube, size in ((0.2, 0.6), (0.4, 0.8))},
-    **{f"drilled {radius}": drilled(radius, size) for radius, size in ((0.05, 0.4), (0.2, 0.6))},
+    **{f"torus {tube}": torus(tube, size) for tube, size in ((0.2, 0.3), (0.4, 0.8))},
+    **{f"drilled {radius}": drilled(radius, size) for radius, size in ((0.05, 0.15), (0.2, 0.6))},
 }
 
 

@@ -28,6 +28,9 @@ from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import MeshfixError
 from meshfix_cli.mesh.judged import Judged
 
+# Hypothesis warns of its own account of large files, which becomes an error here and hides what it found.
+pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
+
 EXAMPLES = int(os.environ.get("MESHFIX_FUZZ", "0"))  # of each format; 0: the same hundred in every run
 SECONDS = 10  # of one file of some kilobytes; it takes milliseconds
 MEMORY = 10  # times the file ...

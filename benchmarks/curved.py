@@ -74,9 +74,10 @@ def optimised(path: Path, method: str) -> tuple[int, float, float]:
     gmsh.open(str(path))
     gmsh.option.setNumber("Mesh.HighOrderFixBoundaryNodes", 1)
     _, seconds = timed(lambda: gmsh.model.mesh.optimize(method))
-    target = path.with_suffix(f".{method}.msh")
-    gmsh.write(str(target))
-    return (*figures(read(target)), seconds)
+    with tempfile.TemporaryDirectory() as folder:
+        target = Path(folder, "optimised.msh")
+        gmsh.write(str(target))
+        return (*figures(read(target)), seconds)
 
 
 def by_gmsh(path: Path, method: str) -> str:

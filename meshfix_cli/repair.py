@@ -289,7 +289,9 @@ class Judge:
         if not (self.brief or command == "perturb"):
             start = next(iter(stages.values()))
             before = start if reference is None else start.with_vertices(reference)
-            if result.freedom is None:
+            if result.quadratic is not None:  # whose boundary does not slide
+                slides = {}
+            elif result.freedom is None:
                 slides = self._might_slide(document, result, summaries[shown[-1]], most)
             else:
                 slides = {**self._slid(before, result), "ceiling_without_sliding": ceiling(start.held, self.threads)}

@@ -18,7 +18,7 @@ from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, rea
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
-    from meshfix_cli.mesh.quadratic import Quadratic
+    from meshfix_cli.mesh.quadratic import Judgement, Quadratic
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -149,6 +149,12 @@ class Mesh:
         return self.movable & ~self.topology.of_vertices(self.freedom.frame >= 0)
 
     @property
+    def used(self) -> NDArray[np.bool_]:
+        """(n,) bool: the vertices of elements, and of curved ones all nodes: what is moved by itself."""
+        used = self.topology.used
+        return used if self.quadratic is None else used | self.quadratic.used
+
+    @property
     def held(self) -> Mesh:
         """The same mesh, in which nothing slides."""
         return replace(self, movable=read_only(self.anywhere), freedom=None)
@@ -166,20 +172,35 @@ class Mesh:
         smallest : float
             The smallest signed area or volume of all corner simplices, or of all curved elements, in model units.
         """
+        if self.quadratic is not None:
+            wrong, smallest, _ = self.judge_curved(threads)
+            return int(wrong.sum()), smallest
         inverted, smallest = Judged(self.topology.connectivity).check(self.along_curve(self.points), threads)
-        if self.quadratic is None:
-            return len(inverted), smallest
-        wrong = np.zeros(self.topology.m, dtype=bool)
-        wrong[self.topology.connectivity.rows[inverted]] = True
-        judgement = self.quadratic.judge(self.points, threads)
-        wrong[self.quadratic.rows] = judgement.verdicts != VALID
-        smallest = float(judgement.measures.min())
-        if len(self.quadratic) < self.topology.m:
-            others = np.delete(self.topology.positions, self.quadratic.rows)
-            smallest = min(
-                smallest, Judged(self.topology.connectivity, others).check(self.along_curve(self.points), threads)[1]
-            )
-        return int(wrong.sum()), smallest
+        return len(inverted), smallest
+
+    def judge_curved(self, threads: int = 1) -> tuple[NDArray[np.bool_], float, Judgement]:
+        """Judge a mesh with `quadratic` elements, and the others as straight ones.
+
+        Returns
+        -------
+        wrong : (m,) bool
+            The inverted elements.
+        smallest : float
+            See `check`.
+        judgement : Judgement
+            Of the quadratic elements.
+        """
+        quadratic, topology = self.quadratic, self.topology
+        assert quadratic is not None
+        judgement = quadratic.judge(self.points, threads)
+        wrong, smallest = np.zeros(topology.m, dtype=bool), float(judgement.measures.min())
+        wrong[quadratic.rows] = judgement.verdicts != VALID
+        others = np.delete(topology.positions, quadratic.rows)
+        if len(others):
+            inverted, least = Judged(topology.connectivity, others).check(self.along_curve(self.points), threads)
+            wrong[topology.connectivity.rows[others[inverted]]] = True
+            smallest = min(smallest, least)
+        return wrong, smallest, judgement
 
     def stuck(self, threads: int = 1) -> NDArray[np.int32]:
         """Return the rows (k,), in the order of the connectivity, of the elements that have no free vertex."""

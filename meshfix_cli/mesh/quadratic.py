@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.ties import Ties, ties_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -73,14 +74,19 @@ class Quadratic:
         blocks: Sequence[tuple[str, NDArray[np.integer]]],
         n: int,
         rows: NDArray[np.integer] | None = None,
+        ties: Ties | None = None,
     ) -> None:
-        """Take elements by their types, such as ("tetra10", nodes (k, 10)); by default they are all of the mesh."""
+        """Take elements by their types, such as ("tetra10", nodes (k, 10)); by default they are all of the mesh.
+
+        `ties`, of these and maybe of others, are found where they are not given.
+        """
         code = {element.key: i for i, element in enumerate(SECOND_ORDER)}
         self.codes = np.concatenate([np.full(len(nodes), code[key], dtype=np.uint8) for key, nodes in blocks])
         self.nodes = np.concatenate([nodes.ravel() for _, nodes in blocks]).astype(np.int32)
         self.offsets = np.concatenate([[0], np.cumsum(np.array([one.nodes for one in SECOND_ORDER])[self.codes])])
         self.n = n
         self.rows = np.arange(len(self.codes)) if rows is None else rows
+        self._ties = ties or ties_of([(ELEMENTS[key], nodes) for key, nodes in blocks], n)[0]
         self.free = self.used & ~self.corners
         self.giving = np.zeros(n, dtype=bool)
         self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n)
@@ -100,31 +106,9 @@ class Quadratic:
         return Judgement(*self.kernel.judge(points, threads))
 
     @cached_property
-    def between(self) -> list[tuple[NDArray[np.int32], NDArray[np.int32]]]:
-        """The nodes (k,) that are no corners, and the corners (k, c) whose mean each is in a straight element.
-
-        For one number c of corners after the other; a node of several elements once.
-        """
-        found: dict[int, list[tuple[NDArray[np.int32], NDArray[np.int32]]]] = {}
-        for code in np.unique(self.codes).tolist():
-            here, means = self.offsets[:-1][self.codes == code], kernels.QUADRATIC_SHAPES[code][1]
-            for place, corners in enumerate(means):
-                if len(corners) > 1:
-                    ends = self.nodes[here[:, None] + np.array(corners)]
-                    found.setdefault(len(corners), []).append((self.nodes[here + place], ends))
-        groups = []
-        for pairs in found.values():
-            nodes, first = np.unique(np.concatenate([nodes for nodes, _ in pairs]), return_index=True)
-            groups.append((nodes, np.concatenate([ends for _, ends in pairs])[first]))
-        return groups
-
-    @cached_property
     def corners(self) -> Mask:
         """(n,) bool: the points that are corners of elements."""
-        mask = self.used.copy()
-        for nodes, _ in self.between:
-            mask[nodes] = False
-        return mask
+        return self.used & ~self._ties.nodes
 
     @cached_property
     def used(self) -> Mask:
@@ -136,8 +120,8 @@ class Quadratic:
     def straight(self, points: Array) -> Array:
         """Return points (n, d) with each node that is no corner where the straight element has it."""
         found = points.copy()
-        for nodes, ends in self.between:
-            found[nodes] = points[ends].mean(axis=1)
+        for tie in self._ties.groups:
+            found[tie.nodes] = tie.middle(points)
         return found
 
     def bent(self, points: Array) -> Mask:

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 Mask = NDArray[np.bool_]
 OFF_PLANE = 1e-6  # of the size of a plane mesh, by which its nodes may lie off
-# Nodes beside corners that elements with a node in each face have.
-_COMPLETE = {"wedge": 12, "hexahedron": 19}
 
 
 def quadratic_of(
@@ -70,7 +68,7 @@ def quadratic_of(
         rows.append(here)
     boundary = _on_facets(mesh, ties, [None])
     between = _on_facets(mesh, ties, regions)
-    quadratic = Quadratic(blocks, mesh.topology.n, np.concatenate(rows))
+    quadratic = Quadratic(blocks, mesh.topology.n, np.concatenate(rows), ties)
     return quadratic.holding(boundary | between | on_cells | other, boundary & ~other)
 
 
@@ -113,12 +111,10 @@ def _alike(ties: Ties) -> Mask:
 def _lacking(part: Part, ties: Ties) -> NDArray[np.integer]:
     """Return nodes (k,) on edges and faces of elements that do not have them: there they must stay in the middle."""
     shape = ELEMENTS[part.key].shape
-    some = [np.empty(0, dtype=np.int32)] if part.nodes is not None else [
-        _found(ties, part.vertices[:, list(ends)]) for edges in shape.parallel for ends in edges
-    ]  # fmt: skip
-    if part.nodes is None or part.refined is None or len(part.refined.weights) < _COMPLETE.get(part.key, 0):
-        some += [_found(ties, part.vertices[:, list(facet)]) for facet in shape.facets if len(facet) == 4]
-    return np.concatenate(some)
+    own = [] if part.refined is None else [set(np.flatnonzero(weights)) for weights in part.refined.weights]
+    sides = [*(ends for edges in shape.parallel for ends in edges), *(one for one in shape.facets if len(one) == 4)]
+    found = [_found(ties, part.vertices[:, list(side)]) for side in sides if set(side) not in own]
+    return np.concatenate([np.empty(0, dtype=np.int32), *found])
 
 
 def _is_judged(part: Part) -> bool:

@@ -103,12 +103,6 @@ class Document:
         return self.solved.some(self.mesh.topology.source)
 
     @property
-    def _used(self) -> NDArray[np.bool_]:
-        """(n,) bool: the points that are moved by themselves."""
-        quadratic, used = self.mesh.quadratic, self.mesh.topology.used
-        return used if quadratic is None else used | quadratic.used
-
-    @property
     def higher_order(self) -> dict[str, int]:
         """Number of elements of each type that has more nodes than corners."""
         counts: dict[str, int] = {}
@@ -132,7 +126,7 @@ class Document:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
         original = self.source.points
         points: NDArray[np.floating[Any]] = original.copy()
-        moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & self._used
+        moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & self.mesh.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows
             if self.basis is None:
                 np.copyto(points, mesh.points, casting="same_kind", where=moved[:, None])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,6 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import Block
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
-
-if TYPE_CHECKING:
-    from meshfix_cli.mesh.quadratic import Quadratic
 
 Array = NDArray[np.float64]
 BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
@@ -144,7 +140,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     """
     if mesh.quadratic is not None:
         straight = summarise(replace(mesh, quadratic=None), metrics, threads, reference)
-        return _with_curved(straight, mesh, mesh.quadratic, threads)
+        return _with_curved(straight, mesh, threads)
     if not mesh.topology.simplicial:
         return _summarise_elements(mesh, metrics, threads, reference)
     connectivity, bins = mesh.topology.connectivity, BINS[mesh.dimension]
@@ -167,21 +163,17 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     )
 
 
-def _with_curved(straight: Summary, mesh: Mesh, quadratic: Quadratic, threads: int) -> Summary:
+def _with_curved(straight: Summary, mesh: Mesh, threads: int) -> Summary:
     """Return the summary of straight elements with the verdicts of the curved ones."""
-    found = quadratic.judge(mesh.points, threads)
-    wrong = np.zeros(mesh.topology.m, dtype=bool)
-    wrong[straight.inverted_elements] = True
-    wrong[quadratic.rows] = found.verdicts != VALID
+    wrong, least, found = mesh.judge_curved(threads)
     curved = Curved(
-        count=len(quadratic),
+        count=len(found.verdicts),
         inverted=int((found.verdicts != VALID).sum()),
         inside=int((found.verdicts == INSIDE).sum()),
         smallest=float(found.smallest.min()),
         scaled_jacobian=float(found.scaled_jacobians.min()),
     )
     inverted = np.flatnonzero(wrong).astype(np.int32)
-    least = mesh.check(threads)[1]
     return replace(straight, inverted=len(inverted), inverted_elements=inverted, min_measure=least, curved=curved)
 
 
@@ -297,8 +289,7 @@ def distances(before: Mesh, after: Mesh) -> Array:
     """
     with np.errstate(invalid="ignore"):  # of points that are of no element
         first, *others = (along * along for along in (after.points - before.points).T)
-        used = before.topology.used if before.quadratic is None else before.topology.used | before.quadratic.used
-        return np.where(used, np.sqrt(sum(others, first)), 0.0)
+        return np.where(before.used, np.sqrt(sum(others, first)), 0.0)
 
 
 def displacement(before: Mesh, after: Mesh) -> dict[str, float]:

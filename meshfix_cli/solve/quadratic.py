@@ -272,19 +272,17 @@ def curved_steps(
     """
     quadratic = mesh.quadratic
     assert quadratic is not None
-    clock = _Clock(mesh, threads)
-    yield mesh, clock.record("input", mesh)
-    best, rank = mesh, mesh.check(threads)
-    found = [mesh]
+    clock, limits = _Clock(mesh, threads), _limits(mesh, mesh.points, max_move, threads)
+    first = clock.record("input", mesh)
+    yield mesh, first
+    best, found = mesh, [mesh]
     if _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
             best = replace(moved, quadratic=quadratic).with_points(followed)
             if record.sweep:
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
-    limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, mesh.points, max_move, threads)
-    candidates = [best] if best is mesh or best.check(threads)[0] < rank[0] else [best, mesh]
-    for start in candidates:
+    for start in [best] if best is mesh or best.check(threads)[0] < first.inverted else [best, mesh]:
         best = start
         for name, points in steps(quadratic, start.points, limits, floor):
             best = start.with_points(points)
@@ -327,8 +325,7 @@ def giving_way(mesh: Mesh, start: Array, max_move: float, threads: int) -> tuple
     """
     quadratic = mesh.quadratic
     assert quadratic is not None
-    limits = Limits((mesh.anywhere & ~_linear(mesh)) | quadratic.free, start, max_move, threads)
-    found = relaxed(quadratic, mesh.points, limits, quadratic.giving)
+    found = relaxed(quadratic, mesh.points, _limits(mesh, start, max_move, threads), quadratic.giving)
     if found is None:
         return None
     ways = np.linalg.norm(found - mesh.points, axis=1)[quadratic.giving]
@@ -337,29 +334,23 @@ def giving_way(mesh: Mesh, start: Array, max_move: float, threads: int) -> tuple
 
 def _is_tangled(mesh: Mesh, threads: int) -> bool:
     """Whether a straight element is inverted that is invalid as it is curved as well, and has a free corner."""
-    topology, quadratic = mesh.topology, mesh.quadratic
+    quadratic, rows = mesh.quadratic, mesh.topology.connectivity.rows
     assert quadratic is not None
-    wrong = np.zeros(topology.m, dtype=bool)
-    wrong[
-        topology.connectivity.rows[Judged(topology.connectivity).check(mesh.along_curve(mesh.points), threads)[0]]
-    ] = True
-    wrong[topology.connectivity.rows[mesh.stuck(threads)]] = False
-    both = np.flatnonzero(quadratic.judge(mesh.points, threads).verdicts != VALID)
-    valid = np.ones(topology.m, dtype=bool)
-    valid[quadratic.rows] = True
-    valid[quadratic.rows[both]] = False
-    return bool((wrong & ~valid).any())
+    wrong = np.zeros(mesh.topology.m, dtype=bool)
+    wrong[rows[Judged(mesh.topology.connectivity).check(mesh.along_curve(mesh.points), threads)[0]]] = True
+    wrong[rows[mesh.stuck(threads)]] = False
+    return bool(wrong[quadratic.rows[quadratic.judge(mesh.points, threads).verdicts != VALID]].any())
 
 
-def _linear(mesh: Mesh) -> Mask:
-    """Mark the corners (n,) of elements that are not of second order: these stay as the straight elements have them."""
-    mask = np.zeros(mesh.topology.n, dtype=bool)
-    assert mesh.quadratic is not None
-    others = np.ones(mesh.topology.m, dtype=bool)
-    others[mesh.quadratic.rows] = False
+def _limits(mesh: Mesh, start: Array, max_move: float, threads: int) -> Limits:
+    """Let nodes move that may, and corners, but those of other elements, which stay straight."""
+    quadratic, others = mesh.quadratic, np.ones(mesh.topology.m, dtype=bool)
+    assert quadratic is not None
+    others[quadratic.rows] = False
+    corners = mesh.anywhere.copy()
     for block in mesh.topology.blocks:
-        mask[block.vertices[others[block.rows]]] = True
-    return mask
+        corners[block.vertices[others[block.rows]]] = False
+    return Limits(corners | quadratic.free, start, max_move, threads)
 
 
 class _Clock:

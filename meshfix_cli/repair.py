@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from meshfix_cli.mesh import curved
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.meshfile.formats import Format
@@ -165,17 +166,29 @@ class Method:
 
     def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
         """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
+        if document.mesh.surface is not None:
+            return self.on_surface(document, reference)
         if self.slide == "none" or document.mesh.quadratic is not None:  # corners and nodes would part
             return document
         from meshfix_cli.meshfile.sliding import slid
 
-        smooth = None
-        if self.slide == "curved":
-            from meshfix_cli.mesh.curved import Smooth
-
-            mesh = document.mesh if reference is None else document.mesh.with_vertices(reference)
-            smooth = Smooth(self.feature_angle, self.max_deviation.on_boundary(mesh))
+        smooth = self._smooth(document, reference) if self.slide == "curved" else None
         return slid(document, self.slide_interfaces, reference, smooth=smooth)
+
+    def on_surface(
+        self, document: Document, reference: NDArray[np.float64] | None = None, threads: int = 1
+    ) -> Document:
+        """Return a document of a surface in which vertices slide on it, as they always do."""
+        from meshfix_cli.meshfile.surfaces import on_surface
+
+        smooth = self._smooth(document, reference)
+        return on_surface(document, smooth, self.slide, self.slide_interfaces, reference, threads)
+
+    def _smooth(self, document: Document, reference: NDArray[np.float64] | None) -> curved.Smooth:
+        from meshfix_cli.mesh.curved import Smooth
+
+        mesh = document.mesh if reference is None else document.mesh.with_vertices(reference)
+        return Smooth(self.feature_angle, self.max_deviation.on_boundary(mesh))
 
     def reach(self, mesh: Mesh, threads: int) -> float:
         """Return how far vertices may move, in model units."""
@@ -216,8 +229,18 @@ class Method:
             found = drain(watch(self._curved_steps(mesh, reach, threads, reference)))
             return Outcome(*found, find_obstacles(found[2], threads))
         obstacles = find_obstacles(mesh, threads)
+        if mesh.surface is not None:
+            return Outcome(*drain(watch(self._surface_steps(mesh, reach, threads))), obstacles)
         run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
         return Outcome(*drain(watch(run)), obstacles)
+
+    def _surface_steps(self, mesh: Mesh, reach: float, threads: int) -> Steps:
+        """Run what surfaces need, see `surface.surface_steps`."""
+        from meshfix_cli.solve.surface import surface_steps
+
+        smoothing = partial(self.steps, reach=reach, threads=threads)
+        untangling = partial(replace(self, smooth=0).steps, reach=reach, threads=threads)
+        return surface_steps(mesh, untangling, smoothing, threads)
 
     def _curved_steps(
         self, mesh: Mesh, reach: float, threads: int, reference: NDArray[np.float64] | None = None
@@ -230,6 +253,11 @@ class Method:
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
         relax = self.curving == "relax"
         return curved_steps(mesh, straight, floor=floor, relax=relax, max_move=reach, threads=threads)
+
+
+def as_surface(document: Document) -> Document:
+    """Return a document in which the vertices of a surface slide on it, if it is one, and its features are held."""
+    return document if document.mesh.surface is None else Method().on_surface(document)
 
 
 @dataclass(frozen=True)
@@ -285,12 +313,15 @@ class Judge:
         most = None if self.brief else ceiling(result, self.threads)
         asked = (one.name for one in self.requirements if one.is_metric)
         metrics = tuple(dict.fromkeys((*self.metrics, *asked)))
-        summaries = {stage: summarise(stages[stage], metrics, self.threads, reference) for stage in shown}
+        shapes = reference if result.surface is None else None
+        summaries = {stage: summarise(stages[stage], metrics, self.threads, shapes) for stage in shown}
         if not (self.brief or command == "perturb"):
             start = next(iter(stages.values()))
             before = start if reference is None else start.with_vertices(reference)
             if result.quadratic is not None:  # whose boundary does not slide
                 slides = {}
+            elif result.surface is not None:
+                slides = self._slid(before, result) if command == "untangle" else {}
             elif result.freedom is None:
                 slides = self._might_slide(document, result, summaries[shown[-1]], most)
             else:
@@ -375,6 +406,7 @@ def repair(
         Nothing was written.
     """
     from meshfix_cli.quality.summary import displacement
+    from meshfix_cli.report.happened import of_boundary, what_happened
 
     judge.check(document)
     threads = judge.threads
@@ -386,9 +418,9 @@ def repair(
     # Processes write what they hold: not the nodes between corners.
     result, written = files.write(document, after, output, put if document.ties is None else None)
     asked = method.smooth and not method.only_invalid and reference is None
-    notes = (*slid, *_what_happened(document, bool(asked), outcome, after, rounded), *written)
+    notes = (*slid, *what_happened(document, bool(asked), outcome, after, rounded), *written)
     if result.quadratic is not None:
-        notes += _of_boundary(document.mesh, result, method.curving, reach, threads)
+        notes += of_boundary(document.mesh, result, method.curving, reach, threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}
     facts: dict[str, Any] = {"strategy": method.strategy, "displacement": displacement(outcome.before, result)}
     if outcome.ranks:
@@ -428,26 +460,6 @@ def _solved(
     return freed, outcome, notes
 
 
-def _of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, threads: int) -> tuple[str, ...]:
-    """Say how far curved edges of the boundary gave way, or would have to."""
-    import numpy as np
-
-    from meshfix_cli.solve.quadratic import giving_way
-
-    assert after.quadratic is not None
-    ways = np.linalg.norm(after.points - before.points, axis=1)[after.quadratic.giving]
-    if curving == "relax" and (ways > 0).any():
-        count = counted(int((ways > 0).sum()), "curved node of the boundary", "curved nodes of the boundary")
-        far = f"{ways.max():.3g} ({ways.max() / before.mean_edge_length():.2g}h)"
-        return (f"--curving relax moved {count} by at most {far}",)
-    found = giving_way(after, before.points, reach, threads) if curving == "hold" and after.check(threads)[0] else None
-    if found is None:
-        return ()
-    many = counted(found[0], "curved node of the boundary", "curved nodes of the boundary")
-    far = f"{found[1]:.3g} ({found[1] / before.mean_edge_length():.2g}h)"
-    return (f"--curving relax would move {many} by at most {far}, and all elements are valid then",)
-
-
 def _rank(document: Document, outcome: Outcome) -> tuple[int, float]:
     """Return how good is what a file will hold: the smaller the better."""
     from meshfix_cli.quality.summary import summarise
@@ -455,26 +467,3 @@ def _rank(document: Document, outcome: Outcome) -> tuple[int, float]:
     mesh, _ = document.first_valid_as_stored(outcome.after, outcome.untangled, outcome.before)
     stored = summarise(document.as_stored(mesh))
     return stored.inverted, -stored.smallest
-
-
-def _what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
-    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded.
-
-    `asked`: better elements were asked for.
-    """
-    nothing = "no element that is judged" if document.not_judged else "no element"
-    none = "no angle" if document.mesh.topology.simplicial else "none"
-    if document.mesh.quadratic is not None and outcome.after is outcome.before and outcome.valid:
-        return (f"{nothing} is inverted, and no coefficient is small: nothing was moved",)
-    if outcome.after is outcome.before and outcome.valid:
-        if len(outcome.records) > 1:
-            return (f"{nothing} is inverted and {none} could be made better: nothing was moved",)
-        angles = f" and {none} is below what --threshold asks for" * asked
-        return (f"{nothing} is inverted{angles}: nothing was moved",)
-    if outcome.records[-1].inverted or not rounded:
-        return ()
-    kind = document.source.points.dtype.name
-    way_out = "; --double stores them as they are" if kind == "float32" else ""
-    written = "" if after is outcome.after else ", so the mesh before that is written"
-    inverted = counted(rounded, "element", "elements")
-    return (f"positions rounded to the file's {kind} invert {inverted}{written}{way_out}",)

@@ -12,7 +12,7 @@ from meshfix_cli.cli.names import FILE
 from meshfix_cli.cli.options import Draw, Show, drawing, drawing_cells, holding, reporting, requiring
 from meshfix_cli.cli.process import ERROR, INVERTED, SOME_FAILED, VALID, complain
 from meshfix_cli.errors import MeshfixError
-from meshfix_cli.repair import Held
+from meshfix_cli.repair import Held, as_surface
 
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
@@ -48,7 +48,7 @@ def quality(
         try:
             check_input(source)
             check_others(beside, source)
-            document = held.read(source, show.threads)
+            document = as_surface(held.read(source, show.threads))
             check_others(beside, *document.files)
             if cells is not None:
                 write_cells(document, document.mesh, cells, show.threads)

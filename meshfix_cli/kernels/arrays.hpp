@@ -22,6 +22,7 @@ void bind_mesh(nb::module_& m);
 void bind_measures(nb::module_& m);
 void bind_moves(nb::module_& m);
 void bind_quadratic(nb::module_& m);
+void bind_surface(nb::module_& m);
 void bind_text(nb::module_& m);
 
 template <class T>
@@ -61,6 +62,15 @@ auto with_dimension(std::size_t d, const F& f) {
     if (d != 2 && d != 3) throw nb::value_error("the dimension must be 2 or 3");
     const nb::gil_scoped_release release;
     return d == 2 ? f(std::integral_constant<int, 2>{}) : f(std::integral_constant<int, 3>{});
+}
+
+// The same for elements and for the space that they lie in: 2 and 3 are surfaces.
+template <class F>
+auto with_space(std::size_t d, std::size_t space, const F& f) {
+    if (d == space) return with_dimension(d, [&](auto dimension) { return f(dimension, dimension); });
+    if (d != 2 || space != 3) throw nb::value_error("surfaces have 2 dimensions in a space of 3");
+    const nb::gil_scoped_release release;
+    return f(std::integral_constant<int, 2>{}, std::integral_constant<int, 3>{});
 }
 
 }  // namespace meshfix

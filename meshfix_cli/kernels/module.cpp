@@ -14,5 +14,6 @@ MODULE(MESHFIX_MODULE, m) {
     meshfix::bind_measures(m);
     meshfix::bind_moves(m);
     meshfix::bind_quadratic(m);
+    meshfix::bind_surface(m);
     meshfix::bind_text(m);
 }

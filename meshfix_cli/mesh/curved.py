@@ -162,8 +162,7 @@ class _Shaped:
 
     def __init__(self, points: Array, given: Constraints, smooth: Smooth) -> None:
         self.points, self.given, self.smooth = points, given, smooth
-        normals, _ = normals_of(points, given.facets, 0.0)
-        self.units = _unit(normals)
+        self.units = _unit(normals_of(points, given.facets, 0.0)[0]) if given.normals is None else given.normals
         self.folds = 0
 
     def meet_smoothly(self, pairs: Numbers) -> Mask:
@@ -328,7 +327,10 @@ def _curved(
     first = np.concatenate([[0], np.cumsum(np.bincount(of_piece[order], minlength=count))]).astype(np.int32)
     vertices = np.concatenate([one.vertices for one in pieces])[order]
     ways = np.concatenate([one.ways for one in pieces])[order]
-    around = around[(shape[around[:, 0]] >= 0) & (around[:, 3] >= 0)]
+    bounded = shape >= 0
+    if found.given.normals is not None:  # a surface: its flat parts go over into others
+        bounded[around[bounded[around[:, 0]] & (around[:, 3] >= 0), 1:3]] = True
+    around = around[bounded[around[:, 0]] & (around[:, 3] >= 0)]
     around = around[np.argsort(around[:, 0], kind="stable")]
     place = np.empty(len(of_piece), dtype=np.int32)
     place[order] = np.arange(len(order), dtype=np.int32)

@@ -11,14 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import SIMPLICES
-from meshfix_cli.mesh.judged import VALID, Judged
-from meshfix_cli.mesh.mixed import build_mixed, checked_blocks
+from meshfix_cli.mesh.elements import JUDGED, SIMPLICES
+from meshfix_cli.mesh.judged import VALID, Judged, Unfolded
+from meshfix_cli.mesh.mixed import MixedTopology, build_mixed, checked_blocks
 from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, read_only, refers_outside, rows_of
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
     from meshfix_cli.mesh.quadratic import Judgement, Quadratic
+    from meshfix_cli.mesh.surface import Surface
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -45,6 +46,8 @@ class Mesh:
         Where those of the movable vertices may go that are on the boundary; None: there are none.
     quadratic : Quadratic or None
         The elements of second order that are curved; None: each element is the straight one of its corners.
+    surface : Surface or None
+        What tells the sides of a surface in space, of which the points are (n, 3) and the elements of dimension 2.
     """
 
     points: NDArray[np.float64]
@@ -53,6 +56,7 @@ class Mesh:
     apart: bool = False
     freedom: Freedom | None = None
     quadratic: Quadratic | None = None
+    surface: Surface | None = None
 
     @classmethod
     def build(
@@ -67,7 +71,7 @@ class Mesh:
         Parameters
         ----------
         points : (n, d) float
-            d = 2 for triangles and quadrilaterals, 3 for solids.
+            d = 2 for triangles and quadrilaterals, 3 for solids and for surfaces of these.
         cells : (m, d+1) int, or sequence of (str, (k, nodes) int)
             Simplices, or elements by their types, such as ("hexahedron", ...), which are numbered in this order.
             Numbered either way round; see `Topology.flipped`.
@@ -79,7 +83,7 @@ class Mesh:
         ------
         InvalidMeshError
             Wrong shapes, no elements, indices out of range, coordinates that are not finite or too large,
-            an element that names a vertex twice, a facet of more than two elements, a Moebius band.
+            an element that names a vertex twice; but for surfaces, a facet of more than two elements, a Moebius band.
         """
         p = np.array(points, dtype=np.float64, order="C")
         blocks = _blocks_of(cells)
@@ -98,12 +102,17 @@ class Mesh:
         movable = topology.used & ~topology.boundary
         if fixed is not None:
             movable &= ~np.asarray(fixed, dtype=bool)
-        return cls(read_only(p), topology, read_only(movable))
+        mesh = cls(read_only(p), topology, read_only(movable))
+        if p.shape[1] == topology.dimension:
+            return mesh
+        from meshfix_cli.mesh.surface import seen
+
+        return seen(mesh, threads)
 
     @property
     def dimension(self) -> int:
-        """2 or 3."""
-        return self.points.shape[1]
+        """That of the elements, 2 or 3."""
+        return self.topology.dimension
 
     def with_points(self, points: NDArray[np.float64]) -> Mesh:
         """Return the same mesh with other positions.
@@ -175,8 +184,32 @@ class Mesh:
         if self.quadratic is not None:
             wrong, smallest, _ = self.judge_curved(threads)
             return int(wrong.sum()), smallest
-        inverted, smallest = Judged(self.topology.connectivity).check(self.along_curve(self.points), threads)
+        inverted, smallest = self.judged().check(self.along_curve(self.points), threads)
         return len(inverted), smallest
+
+    def judged(self, rows: NDArray[np.integer] | None = None) -> Judged:
+        """Return some elements, by their rows (k,) in the order of the connectivity, or all, to be judged."""
+        return Judged(self.topology.connectivity, rows, None if self.surface is None else self.surface.normals)
+
+    def unfolded(self, threads: int = 1) -> Mesh:
+        """Return the elements of a surface one by one in their planes, each with nodes of its own; see `Unfolded`."""
+        assert self.surface is not None
+        topology, blocks = self.topology, self.topology.blocks
+        normals = topology.of_rows(self.surface.normals)
+        counts = np.zeros(topology.m, dtype=np.int32)
+        codes = np.zeros(topology.m, dtype=np.uint8)
+        for block in blocks:
+            counts[block.rows] = block.vertices.shape[1]
+            codes[block.rows] = JUDGED.index(block.element)
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+        nodes = np.empty(offsets[-1], dtype=np.int32)
+        for block in blocks:
+            nodes[offsets[block.rows][:, None] + np.arange(block.vertices.shape[1])] = block.vertices
+        apart = Unfolded(nodes, offsets, normals, None if topology.simplicial else codes)
+        kind = Topology if topology.simplicial else MixedTopology
+        source, flipped = np.arange(topology.m, dtype=np.int32), np.zeros(topology.m, dtype=bool)
+        flat = kind(len(nodes), source, flipped, apart.connectivity)
+        return Mesh(read_only(apart.points(self.points, threads)), flat, read_only(np.zeros(len(nodes), dtype=bool)))
 
     def judge_curved(self, threads: int = 1) -> tuple[NDArray[np.bool_], float, Judgement]:
         """Judge a mesh with `quadratic` elements, and the others as straight ones.
@@ -197,7 +230,7 @@ class Mesh:
         wrong[quadratic.rows] = judgement.verdicts != VALID
         others = np.delete(topology.positions, quadratic.rows)
         if len(others):
-            inverted, least = Judged(topology.connectivity, others).check(self.along_curve(self.points), threads)
+            inverted, least = self.judged(others).check(self.along_curve(self.points), threads)
             wrong[topology.connectivity.rows[others[inverted]]] = True
             smallest = min(smallest, least)
         return wrong, smallest, judgement
@@ -213,7 +246,12 @@ class Mesh:
         return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
 
     def boundary_edge_length(self) -> float:
-        """Return the mean length of the sides of the boundary's facets, in model units: no tangle inside changes it."""
+        """Return the mean length of the sides of the boundary's facets, in model units: no tangle inside changes it.
+
+        Of a surface it is that of all edges.
+        """
+        if self.surface is not None:
+            return self.mean_edge_length()
         points, facets = self.along_curve(self.points), self.topology.facets_between(None)[0]
         following = np.roll(facets, -1, axis=1)
         following = np.where(following < 0, facets[:, :1], following)
@@ -243,6 +281,8 @@ def _checked_simplices(
     """Check shapes and indices; return the simplices as (m, d+1) int32."""
     _check_shape(points)
     n, d = points.shape
+    if simplices.ndim == 2 and simplices.shape[1] == 3:
+        d = 2  # also in space
     if simplices.ndim != 2 or simplices.shape[1] != d + 1 or simplices.dtype.kind not in "iu":
         raise InvalidMeshError(f"simplices have the shape {simplices.shape}; (m, {d + 1}) integers are needed")
     if len(simplices) == 0:

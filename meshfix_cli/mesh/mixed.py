@@ -12,7 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, MIXED, Element
-from meshfix_cli.mesh.topology import Block, Topology, crowded_facet, moebius, names_twice, read_only, refers_outside
+from meshfix_cli.mesh.topology import (
+    Block,
+    Topology,
+    crowded_facet,
+    names_twice,
+    read_only,
+    refers_outside,
+    turned_over,
+)
 
 Blocks = Sequence[tuple[Element, NDArray[np.int32]]]
 WIDTH = 4  # vertices of the largest facets
@@ -142,9 +150,12 @@ def checked_blocks(cells: Sequence[tuple[str, ArrayLike]], n: int, dimension: in
     Raises
     ------
     InvalidMeshError
-        A type that is not judged or of another dimension, indices out of range, an element that names a vertex twice.
+        A type that is not judged or of another dimension (those of surfaces have less than the space), indices out of
+        range, an element that names a vertex twice.
     """
     blocks, before = [], 0
+    if {element.shape.dimension for key, _ in cells if (element := ELEMENTS.get(key)) in JUDGED} == {2}:
+        dimension = 2
     for key, values in cells:
         element, rows = ELEMENTS.get(key), np.asarray(values)
         if element not in JUDGED or element.shape.dimension != dimension:
@@ -176,7 +187,7 @@ def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.in
 
     Parameters
     ----------
-    points : (n, d) float64
+    points : (n, d) float64, or (n, 3) of a surface
     blocks : as `checked_blocks` gives them
     used : (k,) int32
         The vertices of elements, ascending.
@@ -185,13 +196,14 @@ def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.in
     Raises
     ------
     InvalidMeshError
-        A facet of more than two elements, a Moebius band.
+        Unless it is a surface: a facet of more than two elements, a Moebius band.
     """
     codes = np.concatenate([np.full(len(rows), JUDGED.index(element), dtype=np.uint8) for element, rows in blocks])
     nodes = np.concatenate([rows.ravel() for _, rows in blocks])
     source: NDArray[np.int32] = np.arange(len(codes), dtype=np.int32)
     mesh = kernels.Connectivity(points, codes, nodes, used, threads)
-    if mesh.crowded >= 0:
+    shape = MIXED[blocks[0][0].shape.dimension].shape
+    if mesh.crowded >= 0 or (points.shape[1] > shape.dimension and _may_repeat(mesh)):
         source = _first_of_each(blocks)
         sizes = np.array([one.nodes for one in JUDGED])[codes]
         kept = np.zeros(len(codes), dtype=bool)
@@ -200,14 +212,20 @@ def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.in
         codes = codes[source]
         mesh = kernels.Connectivity(points, codes, nodes, used, threads)
     if mesh.crowded >= 0:
-        raise crowded_facet(MIXED[points.shape[1]].shape, _facet_of(mesh, mesh.crowded))
-    if not mesh.orientable:
-        raise moebius(MIXED[points.shape[1]].shape)
-    flipped = mesh.against.astype(bool) ^ (mesh.signed_sizes(points) < 0)[mesh.component]
+        raise crowded_facet(shape, _facet_of(mesh, mesh.crowded))
+    flipped = turned_over(mesh, points, shape)
     mesh.take_apart(flipped, threads)
     rows = np.zeros_like(flipped)
     rows[mesh.rows] = flipped
     return MixedTopology(len(points), source, rows, mesh)
+
+
+def _may_repeat(mesh: kernels.Connectivity) -> bool:
+    """Whether an element of a surface has no neighbour but one, or none: others that have its facets are its like."""
+    there = np.where(mesh.facet_mates < 0, -1, mesh.facet_owners[mesh.facet_mates])
+    first = mesh.facet_offsets[:-1]
+    low, high = np.minimum.reduceat(there, first), np.maximum.reduceat(there, first)
+    return bool((low == high).any())
 
 
 def _first_of_each(blocks: Blocks) -> NDArray[np.int32]:

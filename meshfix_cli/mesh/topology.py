@@ -319,6 +319,26 @@ def moebius(shape: Shape) -> InvalidMeshError:
     return InvalidMeshError(f"the {shape.plural} form a Moebius band: no numbering makes all of them positive")
 
 
+def turned_over(mesh: kernels.Connectivity, points: NDArray[np.float64], shape: Shape) -> NDArray[np.bool_]:
+    """Mark the elements (m,), in the order of the connectivity, that are numbered the other way round.
+
+    In a surface: than most of those that it is joined with; where these have no common orientation, than most of those
+    that are numbered as one of them.
+
+    Raises
+    ------
+    InvalidMeshError
+        A Moebius band that is no surface in space.
+    """
+    against = mesh.against.astype(bool)
+    if points.shape[1] > shape.dimension:
+        votes = np.bincount(mesh.component, weights=against * 2.0 - 1.0)
+        return np.asarray(against ^ (votes > 0)[mesh.component])
+    if not mesh.orientable:
+        raise moebius(shape)
+    return against ^ (mesh.signed_sizes(points) < 0)[mesh.component]
+
+
 def build_topology(
     points: NDArray[np.float64], simplices: NDArray[np.int32], used: NDArray[np.int32], threads: int
 ) -> Topology:
@@ -326,7 +346,7 @@ def build_topology(
 
     Parameters
     ----------
-    points : (n, d) float64
+    points : (n, d) float64, or (n, 3) of triangles of a surface
     simplices : (m, d+1) int32
         Checked: numbers of points, none twice in a simplex.
     used : (k,) int32
@@ -336,9 +356,9 @@ def build_topology(
     Raises
     ------
     InvalidMeshError
-        A facet of more than two simplices, a Moebius band.
+        Unless it is a surface: a facet of more than two simplices, a Moebius band.
     """
-    n, d = points.shape
+    n, d = len(points), simplices.shape[1] - 1
     shape = SIMPLICES[d].shape
     source = np.arange(len(simplices), dtype=np.int32)
     mesh = kernels.Connectivity(points, simplices, used, threads)
@@ -349,9 +369,7 @@ def build_topology(
     if mesh.crowded >= 0:
         row, position = divmod(mesh.crowded, d + 1)
         raise crowded_facet(shape, np.delete(mesh.vertices[mesh.simplices[row]], position).tolist())
-    if not mesh.orientable:
-        raise moebius(shape)
-    flipped = mesh.against.astype(bool) ^ (mesh.signed_sizes(points) < 0)[mesh.component]
+    flipped = turned_over(mesh, points, shape)
     rows = np.zeros_like(flipped)
     if flipped.any():
         mesh.flip(flipped, threads)

@@ -30,6 +30,7 @@ FREE = "none"  # the name of no array of regions, by which interfaces are freed
 SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
 # Reasons to hold vertices that may slide all the same, where they are asked to.
 BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
+OF_CURVED = "of curved elements"
 HALFWAY = "between corners of other elements"
 
 
@@ -257,7 +258,9 @@ def build(
         held = {reason: _of_copies(mask, copies) for reason, mask in held.items()}
     if ties is not None:
         held[HALFWAY] = ties.nodes & topology.used
-    if ties is not None and curved.any():
+    if mesh.surface is not None and curved.any():
+        held[OF_CURVED] = _corners_of(solved, curved, len(points))
+    elif ties is not None and curved.any():
         from meshfix_cli.meshfile.curving import check_plane, quadratic_of
 
         if topology.m < solved.m:
@@ -333,6 +336,14 @@ def _are_labels(values: NDArray[Any]) -> bool:
     return bool(values.dtype.kind in "biu" or (np.isfinite(values) & (values == np.round(values))).all())
 
 
+def _corners_of(solved: Solved, which: NDArray[np.bool_], n: int) -> NDArray[np.bool_]:
+    """Mark the corners (n,) of some elements (m,)."""
+    mask = np.zeros(n, dtype=bool)
+    for part in solved.some(np.flatnonzero(which)):
+        mask[part.vertices] = True
+    return mask
+
+
 def _copies(points: NDArray[np.float64], solved: Solved) -> NDArray[np.int64]:
     """Return for each point the first at its place that an element has; itself for what `Mesh.build` will refuse."""
     used = np.unique(solved.vertices())
@@ -380,7 +391,7 @@ def _solved_points(source: Source, solved: Solved) -> tuple[NDArray[np.float64],
     if not (np.abs(used) <= LARGEST_COORDINATE).all() or not np.ptp(used, axis=0).any():
         return flat, None
     basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))
-    return _flat(points, basis), basis
+    return (points, None) if basis is None else (_flat(points, basis), basis)
 
 
 def _flat(points: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:

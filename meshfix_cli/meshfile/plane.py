@@ -14,8 +14,8 @@ FLAT = 1e-6
 FAR = 1e3  # median distances from the middle, beyond which a vertex was thrown away rather than meshed
 
 
-def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np.float64]:
-    """Return two orthonormal vectors (2, 3) that span the plane of the points (n, 3).
+def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np.float64] | None:
+    """Return two orthonormal vectors (2, 3) that span the plane of the points (n, 3); None: they lie in no plane.
 
     Of the two sides the one with the positive largest coordinate of the normal is seen, so a mesh in a plane of
     constant z is seen from above. Planes along the axes give exact unit vectors.
@@ -29,7 +29,7 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     Raises
     ------
     ReadError
-        The points do not lie in one plane, or lie on one line.
+        The points lie on one line.
     """
     points, epsilon = _drawn_near(points, epsilon)
     size = float(np.ptp(points, axis=0).max())
@@ -42,7 +42,7 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     _, axes = np.linalg.eigh(centred.T @ centred)
     normal_vector = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
     if np.abs(centred @ normal_vector).max() > flat:
-        raise ReadError("the elements form a curved surface; only plane meshes, and solid elements, can be untangled")
+        return None
     if np.ptp(centred @ axes[:, 1]) <= flat:
         raise ReadError("all vertices lie on one line")
     return np.stack([axes[:, 2], np.cross(normal_vector, axes[:, 2])])

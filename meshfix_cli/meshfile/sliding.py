@@ -45,12 +45,12 @@ def slid(
     mesh, topology = document.mesh, document.mesh.topology
     now = mesh.along_curve(mesh.points)
     points = now if reference is None else reference
-    code = _joint(topology.m, *document.regions) if document.regions else None
+    code = joint(topology.m, *document.regions) if document.regions else None
     constraints = constraints_of(topology, points, code, tangled)
-    cells = _Cells(document, constraints.facets)
-    labels = _joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
+    cells = CellsBeside(document, constraints.facets)
+    labels = joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
     freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines), smooth)
-    held = cells.held | _twins(document)
+    held = cells.held | twins(document)
     if document.ties is not None:
         held = document.ties.with_corners(held)
     if reference is not None:
@@ -63,7 +63,7 @@ def slid(
     return replace(document, mesh=mesh.sliding(freedom, held))
 
 
-def _joint(count: int, *values: NDArray[np.integer]) -> Int64:
+def joint(count: int, *values: NDArray[np.integer]) -> Int64:
     """Return one number for each that some arrays (count,) have together; 0 where there are none."""
     code = np.zeros(count, dtype=np.int64)
     for one in values:
@@ -73,7 +73,7 @@ def _joint(count: int, *values: NDArray[np.integer]) -> Int64:
     return code
 
 
-def _twins(document: Document) -> Mask:
+def twins(document: Document) -> Mask:
     """Mark the points (n,) of the boundary that lie at one place with others: what touches there may be in contact."""
     first = first_of_each_place(document.mesh.points, np.flatnonzero(document.mesh.topology.boundary))
     copies = first != np.arange(len(first))
@@ -81,7 +81,7 @@ def _twins(document: Document) -> Mask:
     return copies
 
 
-class _Cells:
+class CellsBeside:
     """The cells of the file that are not solved for, as they keep the shape of the mesh.
 
     Attributes
@@ -100,8 +100,9 @@ class _Cells:
         mesh, topology = document.mesh, document.mesh.topology
         solved = {part.run for part in document.solved.parts}
         runs = [i for i, run in enumerate(document.source.cells) if i not in solved and len(run.vertices)]
-        flat = [i for i in runs if _is_straight(document, i, mesh.dimension - 1)]
-        lines = [i for i in runs if mesh.dimension == 3 and _is_straight(document, i, 1)]
+        space = mesh.points.shape[1]
+        flat = [i for i in runs if mesh.surface is None and _is_straight(document, i, space - 1)]
+        lines = [i for i in runs if space == 3 and _is_straight(document, i, 1)]
         self.held = np.zeros(topology.n, dtype=bool)
         for run in (document.source.cells[i] for i in runs if i not in (*flat, *lines)):
             self._hold(np.concatenate([np.ravel(row) for row in run.vertices]).astype(np.int64))
@@ -184,4 +185,4 @@ def _tags(document: Document, runs: list[int]) -> list[Int64]:
         for begin, i in zip((0, *ends[:-1]), runs, strict=True):
             member[begin + np.asarray(rows_of_runs[i], dtype=np.int64)] = 1
         columns.append(member)
-    return np.split(_joint(int(ends[-1]), *columns), ends[:-1])
+    return np.split(joint(int(ends[-1]), *columns), ends[:-1])

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import distinct
 
@@ -90,6 +89,8 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     """
     if mesh.quadratic is not None:
         return _of_curved(mesh, mesh.quadratic, threads)
+    if mesh.surface is not None:
+        return _of_surface(mesh, threads)
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     movable = mesh.along_curve(mesh.movable)
     corners = kernels.check(points, connectivity.simplices, threads)[0]
@@ -98,7 +99,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     hopeless, rows = inverted[free == 0], connectivity.rows
     if not mesh.topology.simplicial:
         stuck = mesh.stuck(threads)
-        wrong = Judged(connectivity, stuck).check(points, threads)[0]
+        wrong = mesh.judged(stuck).check(points, threads)[0]
         hopeless = np.concatenate([hopeless, stuck[wrong]])
     crossing, folding = _meeting(mesh, points, movable, threads)
     return Obstacles(
@@ -108,6 +109,14 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         folding,
         np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
     )
+
+
+def _of_surface(mesh: Mesh, threads: int) -> Obstacles:
+    """Return the elements of a surface that are turned over and have no free vertex; it may cross itself."""
+    stuck, none = mesh.stuck(threads), np.empty(0, dtype=np.int32)
+    wrong = mesh.judged(stuck).check(mesh.along_curve(mesh.points), threads)[0]
+    pairs = np.empty((0, 2), dtype=np.int32)
+    return Obstacles(distinct(mesh.topology.connectivity.rows[stuck[wrong]]), none, pairs, pairs, none)
 
 
 def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:

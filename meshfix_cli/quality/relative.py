@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.judged import VALID, Judged
+from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ def worst_and_mean_to(mesh: Mesh, reference: Array, threads: int = 1) -> tuple[f
     connectivity, points = mesh.topology.connectivity, mesh.along_curve(mesh.points)
     values = mean_ratios(points, reference, connectivity.simplices)
     if not mesh.topology.simplicial:
-        verdicts = Judged(connectivity).judge(points, threads)[0]
+        verdicts = mesh.judged().judge(points, threads)[0]
         values = np.minimum.reduceat(values, connectivity.simplex_offsets[:-1])
         values[verdicts != VALID] = 0.0
     return float(values.min()), float(values.mean())

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import Element
-from meshfix_cli.mesh.judged import INSIDE, VALID, Judged
+from meshfix_cli.mesh.judged import INSIDE, VALID
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.mesh.topology import Block
+from meshfix_cli.mesh.surface import facets_of, is_closed, joined_elements
+from meshfix_cli.mesh.topology import Block, Topology
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
 
@@ -130,7 +131,7 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         Keys of `METRICS`; the summary holds the worst and the mean value of each, among the elements that have it.
     threads : int
     reference : (k, d) float64, optional
-        Where the vertices, in the order of the connectivity, were before the boundary moved.
+        Where the vertices, in the order of the connectivity, were before the boundary moved; not for surfaces.
 
     Returns
     -------
@@ -138,6 +139,8 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         `folded` counts interior facets with both simplices on one side; `percentile_1` is that of the elements'
         smallest angles; `histogram` counts those in bins of `BIN_WIDTH` degrees.
     """
+    if mesh.surface is not None:
+        return _summarise_surface(mesh, metrics, threads)
     if mesh.quadratic is not None:
         straight = summarise(replace(mesh, quadratic=None), metrics, threads, reference)
         return _with_curved(straight, mesh, threads)
@@ -163,6 +166,15 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     )
 
 
+def _summarise_surface(mesh: Mesh, metrics: Sequence[str], threads: int) -> Summary:
+    """Evaluate a surface: its elements one by one in their planes, and the edges at which one is turned over."""
+    summary = summarise(mesh.unfolded(threads), metrics, threads)
+    wrong = np.zeros(mesh.topology.m, dtype=bool)
+    wrong[summary.inverted_elements] = True
+    one, other = wrong[mesh.topology.connectivity.rows[joined_elements(mesh.topology)]].T
+    return replace(summary, folded=int((one != other).sum()))
+
+
 def _with_curved(straight: Summary, mesh: Mesh, threads: int) -> Summary:
     """Return the summary of straight elements with the verdicts of the curved ones."""
     wrong, least, found = mesh.judge_curved(threads)
@@ -180,18 +192,16 @@ def _with_curved(straight: Summary, mesh: Mesh, threads: int) -> Summary:
 def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, reference: Array | None) -> Summary:
     """Evaluate a mesh of other elements than simplices of one type."""
     topology, points = mesh.topology, mesh.along_curve(mesh.points)
-    verdicts, measures, _ = Judged(topology.connectivity).judge(points, threads)
+    verdicts, measures, _ = mesh.judged().judge(points, threads)
     jacobians = evaluate("scaled_jacobian", mesh)
     angles = [_angles(block, mesh.points, threads) for block in topology.blocks]
     smallest, largest = (np.concatenate(part) for part in zip(*angles, strict=True))
     bins = np.clip((jacobians * JACOBIAN_BINS).astype(int), 0, JACOBIAN_BINS - 1)
-    here, there = topology.connectivity.facet_owners, topology.connectivity.facet_mates
-    across = np.where(there >= 0, measures[here[there]], 0.0)
     by_row = topology.of_rows(verdicts)
     return Summary(
         elements=topology.m,
         inverted=int((verdicts != VALID).sum()),
-        folded=int(((measures[here] < 0) & (across > 0)).sum()),
+        folded=_folded(topology, measures),
         min_measure=float(measures.min()),
         min_angle=math.degrees(smallest.min()) if len(smallest) else math.nan,
         max_angle=math.degrees(largest.max()) if len(largest) else math.nan,
@@ -204,6 +214,15 @@ def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, refere
         jacobians=Jacobians(float(jacobians.min()), float(jacobians.mean()), float(np.percentile(jacobians, 1))),
         kinds=tuple(_kind(block, by_row[block.rows], jacobians[block.rows]) for block in topology.blocks),
     )
+
+
+def _folded(topology: Topology, measures: Array) -> int:
+    """Count the facets with both elements on one side; none where elements have nodes of their own."""
+    here, there = topology.connectivity.facet_owners, topology.connectivity.facet_mates
+    if len(there) == 0:
+        return 0
+    across = np.where(there >= 0, measures[here[there]], 0.0)
+    return int(((measures[here] < 0) & (across > 0)).sum())
 
 
 def _kind(block: Block, verdicts: NDArray[np.uint8], jacobians: Array) -> Kind:
@@ -239,7 +258,7 @@ def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
     Where elements are not all simplices, the scaled Jacobian takes the place of the angle. Where some are curved, there
     is the smallest coefficient of the Jacobian determinant as well, see `Curved`; NaN for others.
     """
-    judged = Judged(mesh.topology.connectivity).judge(mesh.along_curve(mesh.points), threads)
+    judged = mesh.judged().judge(mesh.along_curve(mesh.points), threads)
     verdicts, measure, quality = (mesh.topology.of_rows(values) for values in judged)
     curved: dict[str, NDArray[np.generic]] = {}
     if mesh.quadratic is not None:
@@ -264,7 +283,7 @@ def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: in
     count, threads : int
     """
     if mesh.topology.simplicial:
-        judged = Judged(mesh.topology.connectivity)
+        judged = mesh.judged()
         badness = -mesh.topology.of_rows(judged.angles(mesh.along_curve(mesh.points), threads))
     else:
         badness = -evaluate("scaled_jacobian", mesh)
@@ -305,7 +324,7 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
     return {"mean": float(moved.mean()) if len(moved) else 0.0, "largest": float(far.max()), "vertices": len(moved)}
 
 
-def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, float]:
+def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, float | None]:
     """Measure how a boundary that slides on curves and surfaces has changed.
 
     Parameters
@@ -320,13 +339,14 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
         "hausdorff", the distance between the two boundaries, see `Shapes.hausdorff`, in model units; "deviation", that
         of the middles of edges and triangles from the shape, "bound", within which steps keep it, and "beyond", how
         many edges of curves and triangles are not within that; "folds" of the reference, see `Shapes`; and by which
-        share "size", the volume or area, and "boundary", its area or length, have changed.
+        share "size", the volume or area, and "boundary", its area or length, have changed. Of a surface it is its own
+        shape and area, and "size" is the volume that it encloses.
     """
     shapes = after.freedom.shapes if after.freedom is not None else None
     if shapes is None:
         return dict.fromkeys(("hausdorff", "deviation", "bound", "beyond", "folds", "size", "boundary"), 0)
     points, there = before.along_curve(before.points), after.along_curve(after.points)
-    facets = after.topology.facets_between(None)[0]
+    facets = after.topology.facets_between(None)[0] if after.surface is None else facets_of(after.topology)
     (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
     deviations = shapes.deviations(there, threads)
     return {
@@ -335,7 +355,7 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
         "bound": shapes.bound,
         "beyond": int((deviations > shapes.bound * WITHIN).sum()),
         "folds": shapes.folds,
-        "size": _change(size, new_size),
+        "size": _change(size, new_size) if after.surface is None or is_closed(after.topology) else None,
         "boundary": _change(boundary, new_boundary),
     }
 
@@ -380,6 +400,7 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     if len(stuck) == 0:
         return None
     if not mesh.topology.simplicial:
+        mesh = mesh if mesh.surface is None else mesh.unfolded(threads)
         return float(evaluate("scaled_jacobian", mesh)[mesh.topology.connectivity.rows[stuck]].min())
-    judged = Judged(mesh.topology.connectivity, stuck)
+    judged = mesh.judged(stuck)
     return math.degrees(float(judged.angles(mesh.along_curve(mesh.points), threads).min()))

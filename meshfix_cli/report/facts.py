@@ -183,7 +183,7 @@ def _sliding(report: Report) -> str:
     """Say how many vertices slide."""
     if "sliding" not in (report.facts or {}):
         return ""
-    counts, solid = (report.facts or {})["sliding"], report.mesh.dimension == 3
+    counts, solid = (report.facts or {})["sliding"], report.mesh.points.shape[1] == 3
     words = {"lines": "along lines", "planes": "in planes", "curves": "along curves", "surfaces": "on surfaces"}
     shown = (f"{n:,} {words[key]}" for key, n in counts.items() if solid or key in ("lines", "curves"))
     return f" ({', '.join(shown)})"

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.mixed import MixedTopology
 from meshfix_cli.quality.formulas import evaluate
@@ -220,7 +219,7 @@ def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArr
 
 def _worst(report: Report, rows: NDArray[np.int64], inverted_rows: Rows) -> list[Worst]:
     mesh, inverted = report.mesh, np.isin(rows, inverted_rows)
-    judged = Judged(mesh.topology.connectivity, mesh.topology.positions[rows])
+    judged = mesh.judged(mesh.topology.positions[rows])
     points = mesh.along_curve(mesh.points)
     _, measures, angles = judged.judge(points, 1)
     qualities = np.degrees(angles) if mesh.topology.simplicial else evaluate("scaled_jacobian", mesh)[rows]

@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.report.facts import Report
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.mesh import Mesh
 
 
 def sliding(report: Report) -> Iterator[str]:
     """Say how the shape has changed or, where fixed vertices limit the mesh, what sliding would gain."""
     facts = report.facts or {}
-    if "shape" in facts:
-        yield from _changed(facts["shape"], report.mesh.dimension == 3)
+    if "shape" in facts and (report.mesh.surface is None or facts["displacement"]["vertices"]):
+        yield from _changed(facts["shape"], report.mesh)
     if "slide_flat" in facts:
         yield _gain(facts["slide_flat"], report)
 
 
-def _changed(shape: Mapping[str, Any], solid: bool) -> Iterator[str]:
+def _changed(shape: Mapping[str, Any], mesh: Mesh) -> Iterator[str]:
+    solid, what = mesh.points.shape[1] == 3, "boundary" if mesh.surface is None else "surface"
     size, boundary = ("volume", "area") if solid else ("area", "length")
+    within = "" if shape["size"] is None else f", the {size} by {shape['size']:.2g}"
     yield (
-        f"the boundary is within {shape['hausdorff']:.3g} of its shape (Hausdorff distance), its {boundary} changed by "
-        f"{shape['boundary']:.2g} of itself, the {size} by {shape['size']:.2g}"
+        f"the {what} is within {shape['hausdorff']:.3g} of its shape (Hausdorff distance), its {boundary} changed by "
+        f"{shape['boundary']:.2g} of itself{within}"
     )
     if shape["beyond"]:
-        what = "facet" if solid else "edge"
-        far = counted(shape["beyond"], f"{what} is", f"{what}s are")
+        facet = "facet" if solid else "edge"
+        far = counted(shape["beyond"], f"{facet} is", f"{facet}s are")
         yield (
             f"{far} farther from the shape than --max-deviation, {shape['bound']:.3g}, their middles by "
             f"{shape['deviation']:.3g} at most: they left it while elements were inverted, and found no way back"
@@ -34,7 +39,7 @@ def _changed(shape: Mapping[str, Any], solid: bool) -> Iterator[str]:
     if shape["folds"]:
         where = counted(shape["folds"], "edge" if solid else "vertex", "edges" if solid else "vertices")
         yield (
-            f"the boundary itself is folded at {where} and is its own reference: vertices there stay, and others keep "
+            f"the {what} itself is folded at {where} and is its own reference: vertices there stay, and others keep "
             "to it as it is; --reference names the mesh before"
         )
 

@@ -48,19 +48,22 @@ class Positions:
         self.stars, self.max_move = mesh.topology.stars(threads), max_move
         self.points, self.free = mesh.along_curve(mesh.points), mesh.along_curve(mesh.movable)
         self.inside, self.freedom = mesh.along_curve(mesh.anywhere), mesh.freedom
+        self.surface = mesh.surface
+        if mesh.surface is not None:
+            self.inside = self.free
         self.together = self.free if mesh.freedom is None else self.free & ~mesh.freedom.curved
         stuck = mesh.stuck(threads)
-        fixed = Judged(self.stars, stuck)
+        fixed = mesh.judged(stuck)
         inverted = fixed.check(self.points, threads)[0]
         self.stuck = fixed.without(inverted)
-        self.mendable, self.own = Judged(self.stars), team.own_elements
+        self.mendable, self.own = mesh.judged(), team.own_elements
         lost = int(self.own[stuck[inverted]].sum())
         self.hopeless = np.zeros(len(self.mendable), dtype=bool) if hopeless is None else hopeless
         if len(inverted):
             self.mendable = self.mendable.without(stuck[inverted])
             self.own = np.delete(self.own, stuck[inverted])
             self.hopeless = np.delete(self.hopeless, stuck[inverted])
-        smallest = Judged(self.stars, stuck[inverted]).check(self.points, threads)[1]
+        smallest = mesh.judged(stuck[inverted]).check(self.points, threads)[1]
         self.beyond_repair = team.total(lost), team.least(smallest)
         self.some_are_hopeless = team.total(int(self.hopeless.any())) > 0
         self.changed = np.zeros(len(self.points), dtype=bool)
@@ -87,7 +90,7 @@ class Positions:
 
     def meets(self, degrees: float) -> bool:
         """Whether no angle is below the threshold, but for those of simplices without a free vertex."""
-        free = Judged(self.stars).without(self.input.stuck(self.threads)).angles(self.points, self.threads)
+        free = self.input.judged().without(self.input.stuck(self.threads)).angles(self.points, self.threads)
         return self._least(free) >= math.radians(degrees)
 
     def go_back(self, untangling: bool) -> bool:
@@ -156,10 +159,21 @@ class Positions:
         """Return the points (k, d) after a sweep, which keeps account in `states`; the threshold is the user's."""
         threshold_sine2 = self.threshold_sine2 if threshold_sine2 is None else threshold_sine2
         points = points.copy()
+        if self.surface is not None:
+            return self._on_surface(points, move, states, threshold_sine2)
         for blocks in self.team.sweep(points, states):
             kernels.relocate(
                 move, points, states, self.stars, blocks, threshold_sine2, self.floor, self.first[0], self.max_move,
                 self.threads, None if self.freedom is None else self.freedom.kernel,
+            )  # fmt: skip
+        return points
+
+    def _on_surface(self, points: Array, move: Move, states: NDArray[np.uint8], threshold_sine2: float) -> Array:
+        assert self.surface is not None and self.freedom is not None
+        for blocks in self.team.sweep(points, states):
+            kernels.relocate_on_surface(
+                move, points, states, self.stars, self.surface.normals, blocks, threshold_sine2, self.floor,
+                self.first[0], self.max_move, self.threads, self.freedom.kernel,
             )  # fmt: skip
         return points
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.judged import VALID, Judged
+from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
@@ -337,7 +337,7 @@ def _is_tangled(mesh: Mesh, threads: int) -> bool:
     quadratic, rows = mesh.quadratic, mesh.topology.connectivity.rows
     assert quadratic is not None
     wrong = np.zeros(mesh.topology.m, dtype=bool)
-    wrong[rows[Judged(mesh.topology.connectivity).check(mesh.along_curve(mesh.points), threads)[0]]] = True
+    wrong[rows[mesh.judged().check(mesh.along_curve(mesh.points), threads)[0]]] = True
     wrong[rows[mesh.stuck(threads)]] = False
     return bool(wrong[quadratic.rows[quadratic.judge(mesh.points, threads).verdicts != VALID]].any())
 

@@ -39,6 +39,7 @@ GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIE
 GOAL_PATIENCE = 2
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+SURFACE_SWEEPS = 20  # for the mean ratios, where a plane or solid mesh has one energy of all elements
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
 
 
@@ -66,6 +67,15 @@ class Pace:
 
 # Where the boundary slides there is seldom a ceiling: the smallest angle creeps on, and takes the mean with it.
 PACE, SLIDING_PACE = Pace(0.01, 0.05, 1.0, ITERATIONS), Pace(0.03, 0.5, 0.9, 40)
+
+
+def _is_of_surfaces(phase: Phase) -> bool:
+    """Whether a phase works in tangent planes: sweeps, and the shape of elements by their means."""
+    if Move.COME_BACK in phase.moves or phase.to_reference:
+        return False
+    if phase.slides and Move.DRAW_BACK not in phase.moves:  # as all do
+        return False
+    return bool(phase.moves) or phase.shapes in ("first", "lost", "risen")
 
 
 def _raised(sine2: float, degrees: float) -> float:
@@ -113,12 +123,16 @@ class Run(Positions):
 
     def enter(self, phase: Phase) -> bool:
         """Prepare a phase; False: it has nothing to do, or its region is as good as the whole."""
-        if phase.elements is self.mendable.simplicial or (phase.layers and not self.mendable.simplicial):
+        if self.surface is not None and not _is_of_surfaces(phase):
+            return False
+        simplicial = self.mendable.simplicial or self.surface is not None
+        if phase.elements is simplicial or (phase.layers and not simplicial):
             return False
         if phase.slides and self.freedom is None:
             return False
         if Move.DRAW_BACK in phase.moves:
-            return self.left == 0 and self.freedom is not None and self.freedom.shapes is not None
+            tangled = self.surface is None or self.first[1].inverted > 0
+            return self.left == 0 and tangled and self.freedom is not None and self.freedom.shapes is not None
         if phase.smooths:
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
                 return False
@@ -250,7 +264,12 @@ class Run(Positions):
 
     def _shape(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where the shape of all elements is best."""
-        if self.max_move < math.inf or self.left or not self._count(self.together):
+        if self.max_move < math.inf or self.left:
+            return
+        if self.surface is not None:
+            yield from self._shape_of_surface(phase)
+            return
+        if not self._count(self.together):
             return
         angles = self._angles(self.points)
         smallest = self._least(angles)
@@ -266,6 +285,16 @@ class Run(Positions):
             yield shaped(points, stars, free, aims, self.threads, most, self.team.freedom)
 
         yield from self._of_whole(compute, self.points, self._smoothed(phase) & self.together)
+
+    def _shape_of_surface(self, phase: Phase) -> Iterator[Array]:
+        """Yield the points where sweeps for the mean ratios end."""
+        smallest = self._least(self._angles(self.points))
+        self.kept = self.points, self.record, smallest
+        near, points = self._smoothed(phase) & self.team.own_vertices, self.points
+        states, floor = _due(near), math.sin(min(smallest, math.pi / 2)) ** 2
+        for _ in range(SURFACE_SWEEPS):
+            points = self._relocated(points, Move.MEAN_RATIO, states, floor)
+        yield points
 
     def _even(self) -> Iterator[Array]:
         """Yield the points with even sizes and then the best shape, if smallest and mean are larger."""

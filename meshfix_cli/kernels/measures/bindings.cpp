@@ -11,7 +11,7 @@ namespace {
 auto summarise_py(const Matrix<const double>& points, const PyConnectivity& self, int bins, double width, int threads) {
     check_points(points, self);
     Summary total = with_dimension(self.dimension, [&](auto d) {
-        return summarise<d>(points.data(), self.mesh.simplices.data(), self.mesh.mates.data(), self.mesh.m(), bins, width,
+        return summarise<d>(points.data(), self.mesh.simplices.data(), self.mesh.mates.empty() ? nullptr : self.mesh.mates.data(), self.mesh.m(), bins, width,
                             threads);
     });
     return std::make_tuple(to_numpy(std::move(total.smallest)), to_numpy(std::move(total.histogram)), total.sum,

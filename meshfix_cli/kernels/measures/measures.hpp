@@ -236,7 +236,7 @@ Summary summarise(const double* points, const std::int32_t* simplices, const std
         parts[item] = std::move(part);
     });
     for_each_range(m, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        parts[item].folded = folded_facets<D>(sign, mates, begin, end);
+        parts[item].folded = mates == nullptr ? 0 : folded_facets<D>(sign, mates, begin, end);
     });
     total.histogram.assign(bins, 0);
     for (const auto& part : parts) {

@@ -30,24 +30,26 @@ auto rows_view(PyConnectivity& self) {
 
 void init_connectivity(PyConnectivity* self, const Matrix<const double>& points,
                        const Matrix<const std::int32_t>& simplices, const Vector<const std::int32_t>& used, int threads) {
-    if (simplices.shape(1) != points.shape(1) + 1) throw nb::value_error("the simplices are of another dimension");
+    const std::size_t d = simplices.shape(1) - 1;
+    if (points.shape(1) != d && points.shape(1) != 3) throw nb::value_error("the simplices are of another dimension");
     new (self) PyConnectivity();
-    self->dimension = static_cast<int>(points.shape(1));
-    self->mesh = with_dimension(points.shape(1), [&](auto d) {
-        return connect<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
-                          static_cast<std::int64_t>(simplices.shape(0)),
-                          std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
+    self->dimension = static_cast<int>(d);
+    self->mesh = with_space(d, points.shape(1), [&](auto dimension, auto space) {
+        return connect<dimension, space>(points.data(), static_cast<std::int64_t>(points.shape(0)), simplices.data(),
+                                         static_cast<std::int64_t>(simplices.shape(0)),
+                                         std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
     });
 }
 
 void init_elements(PyConnectivity* self, const Matrix<const double>& points, const Vector<const std::uint8_t>& codes,
                    const Vector<const std::int32_t>& nodes, const Vector<const std::int32_t>& used, int threads) {
     new (self) PyConnectivity();
-    self->dimension = static_cast<int>(points.shape(1));
-    self->mesh = with_dimension(points.shape(1), [&](auto d) {
-        return connect_elements<d>(points.data(), static_cast<std::int64_t>(points.shape(0)), codes.data(), nodes.data(),
-                                   static_cast<std::int64_t>(codes.shape(0)),
-                                   std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
+    self->dimension = codes.shape(0) > 0 ? SHAPES.at(codes(0)).dimension : static_cast<int>(points.shape(1));
+    self->mesh = with_space(static_cast<std::size_t>(self->dimension), points.shape(1), [&](auto dimension, auto space) {
+        return connect_elements<dimension, space>(
+            points.data(), static_cast<std::int64_t>(points.shape(0)), codes.data(), nodes.data(),
+            static_cast<std::int64_t>(codes.shape(0)),
+            std::vector<std::int32_t>(used.data(), used.data() + used.shape(0)), threads);
     });
 }
 

@@ -101,12 +101,14 @@ struct FacetKey {
     }
 };
 
-// Each facet is matched at its smallest vertex. A quadrilateral and two triangles in its place are no mates.
-inline Facets match_facets(const Elements& elements, std::int64_t n, int threads) {
+// Each facet is matched at its smallest vertex; `parted`: not where there are more than two. A quadrilateral and two
+// triangles in its place are no mates.
+inline Facets match_facets(const Elements& elements, std::int64_t n, bool parted, int threads) {
     constexpr std::int64_t VERTICES = 1024;
     struct Seen {
-        std::int32_t facet, opposite;  // -1: it has a mate
+        std::int32_t facet, opposite;
         bool odd;
+        int count;
     };
     const std::int64_t count = elements.facet_offsets.back();
     std::vector<std::int32_t> starts(n + 1, 0), at_vertex(count);
@@ -138,14 +140,16 @@ inline Facets match_facets(const Elements& elements, std::int64_t n, int threads
                 bool is_new = false;
                 Seen& other = seen.find(key.sides, is_new);
                 if (is_new) {
-                    other = {f, key.opposite, key.odd};
-                } else if (other.facet < 0 || elements.facet_owners[other.facet] == elements.facet_owners[f]) {
+                    other = {f, key.opposite, key.odd, 1};
+                } else if (elements.facet_owners[other.facet] == elements.facet_owners[f] || (other.count > 1 && !parted)) {
                     crowded[item] = f;
+                } else if (other.count > 1) {
+                    part(facets.mates, other.facet);
                 } else if (other.opposite == key.opposite) {
                     facets.mates[f] = other.facet;
                     facets.mates[other.facet] = f;
                     facets.against[f] = facets.against[other.facet] = key.odd == other.odd;
-                    other.facet = -1;
+                    other.count = 2;
                 }
             }
         }

@@ -64,7 +64,7 @@ Incidence incidence(const std::int32_t* simplices, std::int64_t m, std::int64_t 
 struct Facets {
     std::vector<std::int32_t> mates;
     std::vector<std::uint8_t> against;  // (m, D+1) 1: the two simplices at the facet are numbered against each other
-    std::int64_t crowded = -1;          // a corner whose facet has three simplices, or two that are the same; -1: none
+    std::int64_t crowded = -1;          // a corner whose facet has three simplices, unless such have no mates, or two that are the same; -1: none
 };
 
 // Calls f(key, position, odd) for the facets of a simplex whose smallest vertex is the one at `here`: the key holds the
@@ -91,13 +91,20 @@ void for_each_facet_at(const std::int32_t* simplex, int here, std::integral_cons
     for (int k = 0; k < 3; ++k) add(k);
 }
 
-// Each facet is matched at its smallest vertex.
+// Takes the mates from a facet and its mate.
+inline void part(std::vector<std::int32_t>& mates, std::int32_t facet) {
+    if (mates[facet] >= 0) mates[mates[facet]] = -1;
+    mates[facet] = -1;
+}
+
+// Each facet is matched at its smallest vertex; `parted`: not where there are more than two.
 template <int D>
-Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Incidence& csr, int threads) {
+Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Incidence& csr, bool parted, int threads) {
     constexpr std::int64_t VERTICES = 1024;
     struct Seen {
-        std::int32_t corner;  // -1: it has a mate
+        std::int32_t corner;
         bool odd;
+        int count;
     };
     const auto n = static_cast<std::int64_t>(csr.offsets.size()) - 1;
     Facets facets;
@@ -117,17 +124,17 @@ Facets match_facets(const std::int32_t* simplices, std::int64_t m, const Inciden
                     bool is_new = false;
                     Seen& other = at_vertex.find(key, is_new);
                     if (is_new) {
-                        other = {corner, odd};
+                        other = {corner, odd, 1};
                         return;
                     }
-                    if (other.corner < 0 || simplices[other.corner] == simplices[corner]) {
+                    if (simplices[other.corner] == simplices[corner] || (++other.count > 2 && !parted)) {
                         crowded[item] = corner;
                         return;
                     }
+                    if (other.count > 2) return part(facets.mates, other.corner);
                     facets.mates[other.corner] = corner;
                     facets.mates[corner] = other.corner;
                     facets.against[other.corner] = facets.against[corner] = odd == other.odd;
-                    other.corner = -1;
                 });
             }
         }

@@ -1,7 +1,7 @@
 // The order in which the kernels hold a mesh: vertices along a Morton curve, simplices by their first vertex. What
 // is near in space is then near in memory, whatever the order of the file.
 //
-// points (n, D), simplices (m, D+1) in the numbers of the user
+// points (n, S), simplices (m, D+1) in the numbers of the user; S is D, or 3 for surfaces
 #pragma once
 
 #include <cstdint>
@@ -165,13 +165,13 @@ inline std::vector<std::int32_t> used_vertices(const std::int32_t* simplices, st
 }
 
 // `used` are the vertices of the simplices, ascending.
-template <int D>
+template <int D, int S>
 Order order_mesh(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
                  std::vector<std::int32_t> used, int threads) {
     Order order;
     order.vertices = std::move(used);
     std::vector<std::int32_t> number(n);
-    sort_along_curve<D>(order.vertices, points, threads);
+    sort_along_curve<S>(order.vertices, points, threads);
     for (std::size_t i = 0; i < order.vertices.size(); ++i) number[order.vertices[i]] = static_cast<std::int32_t>(i);
 
     std::vector<std::int32_t> first(m), next(order.vertices.size() + 1, 0);  // first: the smallest vertex of each row

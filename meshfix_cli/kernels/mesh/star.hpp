@@ -104,20 +104,25 @@ struct Star {
             neighbours[i - begin] = p;
             size2 = std::max(size2, norm2(p));
         }
+        position = load<D>(points + v * D) - origin;
+        take_unit(size2);
+        set_roles(stars, v);
+    }
+
+    // Chooses the unit by the square of the star's size, and gives neighbours and position in it; the origin is theirs already.
+    void take_unit(double size2) {
         int exponent = 0;
         radius = std::frexp(std::sqrt(size2), &exponent);
         unit = std::ldexp(1.0, exponent);
         const double scale = 1.0 / unit;
         for (auto& p : neighbours) p = scale * p;
-        position = scale * (load<D>(points + v * D) - origin);
+        position = scale * position;
         fill_blocks();
-        if (stars.elements == nullptr)
-            roles.clear();  // the star before may have been of another mesh
-        else
-            set_roles(stars, v);
     }
 
     void set_roles(const StarsView& stars, std::int64_t v) {
+        roles.clear();  // the star before may have been of another mesh
+        if (stars.elements == nullptr) return;
         roles.resize(blocks.size());
         for (int i = 0; i < static_cast<int>(roles.size()) * LANES; ++i) {
             const std::int32_t corner = stars.corners[stars.offsets[v] + std::min(i, faces_count - 1)];

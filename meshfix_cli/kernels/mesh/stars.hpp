@@ -63,16 +63,17 @@ inline void take_orientation(Connectivity& mesh, Orientation&& orientation) {
     mesh.orientable = orientation.orientable;
 }
 
-template <int D>
+// points (n, S): S is D or, for surfaces, 3. Where more than two elements of a surface meet, it ends.
+template <int D, int S = D>
 Connectivity connect(const double* points, std::int64_t n, const std::int32_t* simplices, std::int64_t m,
                      std::vector<std::int32_t> used, int threads) {
     Connectivity mesh;
-    Order order = order_mesh<D>(points, n, simplices, m, std::move(used), threads);
+    Order order = order_mesh<D, S>(points, n, simplices, m, std::move(used), threads);
     mesh.vertices = std::move(order.vertices);
     mesh.rows = std::move(order.rows);
     mesh.simplices = std::move(order.simplices);
     Incidence csr = incidence<D>(mesh.simplices.data(), m, mesh.n(), threads);
-    Facets facets = match_facets<D>(mesh.simplices.data(), m, csr, threads);
+    Facets facets = match_facets<D>(mesh.simplices.data(), m, csr, S > D, threads);
     mesh.crowded = facets.crowded;
     if (mesh.crowded >= 0) return mesh;
     mesh.offsets = std::move(csr.offsets);
@@ -83,16 +84,16 @@ Connectivity connect(const double* points, std::int64_t n, const std::int32_t* s
 }
 
 // Elements of any shapes: all but their corner simplices.
-template <int D>
+template <int D, int S = D>
 Connectivity connect_elements(const double* points, std::int64_t n, const std::uint8_t* codes, const std::int32_t* nodes,
                               std::int64_t m, std::vector<std::int32_t> used, int threads) {
     Connectivity mesh;
     mesh.vertices = std::move(used);
-    sort_along_curve<D>(mesh.vertices, points, threads);
+    sort_along_curve<S>(mesh.vertices, points, threads);
     std::vector<std::int32_t> number(n);
     for (std::size_t i = 0; i < mesh.vertices.size(); ++i) number[mesh.vertices[i]] = static_cast<std::int32_t>(i);
     mesh.elements = ordered_elements(codes, nodes, m, number, mesh.n(), mesh.rows);
-    Facets facets = match_facets(mesh.elements, mesh.n(), threads);
+    Facets facets = match_facets(mesh.elements, mesh.n(), S > D, threads);
     mesh.crowded = facets.crowded;
     if (mesh.crowded >= 0) return mesh;
     take_orientation(mesh, orient(mesh.elements, facets));

@@ -40,10 +40,10 @@ auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8
     if (static_cast<std::int64_t>(states.shape(0)) != mesh.n()) throw nb::value_error("the states are of another mesh");
     check_freedom(freedom, mesh.n());
     const Counts counts = with_dimension(points.shape(1), [&](auto d) {
-        return relocate<d>(static_cast<Move>(move), stars_of(mesh), points.data(), states.data(), mesh.n(), blocks.data(),
-                           static_cast<std::int64_t>(blocks.shape(0)),
-                           Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move, freedom},
-                           threads);
+        const Sweep sweep{stars_of(mesh), points.data(), states.data(), mesh.n(),
+                          Parameters{threshold_sine2, factorial(d) * min_measure, start.data(), max_move, freedom}};
+        return relocate<Relocation<d>>(static_cast<Move>(move), sweep, blocks.data(),
+                                       static_cast<std::int64_t>(blocks.shape(0)), threads, [](Relocation<d>&) {});
     });
     return std::make_pair(counts.visited, counts.moved);
 }

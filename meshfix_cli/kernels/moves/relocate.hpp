@@ -9,6 +9,7 @@
 #include "moves/come_back.hpp"
 #include "moves/laplacian.hpp"
 #include "moves/mean_ratio.hpp"
+#include "moves/nearness.hpp"
 #include "moves/programme.hpp"
 
 namespace meshfix {
@@ -16,14 +17,6 @@ namespace meshfix {
 enum class Move : int {
     laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
     come_back, untangle_coefficients, draw_back
-};
-
-struct Parameters {
-    double threshold_sine2;  // the active-set method runs on stars below it; for the mean ratio: the floor
-    double min_det;          // smoothing makes no determinant smaller than this, or than the star's smallest
-    const double* start;     // (n, D): where the vertices came from
-    double max_move;         // how far from there they may be; infinity: anywhere
-    const Freedom* freedom = nullptr;  // where they may go; null: anywhere
 };
 
 // What a sweep knows of each vertex. One is due until it has been visited, and again when it or a neighbour moves:
@@ -81,7 +74,7 @@ struct Relocation {
         const double least = curved ? std::min(min_sine2<D>(star, x, 0.0), min_sine2<D>(star, star.position, 0.0)) : 0.0;
         Vec<D> trial = x;
         for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
-            const bool good = !curved || (min_sine2<D>(star, trial, least * (1.0 - SAME_SINE2)) > 0.0 && is_near(v, trial));
+            const bool good = !curved || (min_sine2<D>(star, trial, least * (1.0 - SAME_SINE2)) > 0.0 && nearness().is_near(v, star.to_global(trial)));
             if (good && (!has_inside || loses_nothing(v, trial))) return trial;
             trial = star.snap(star.position + 0.5 * (trial - star.position));
         }
@@ -96,58 +89,14 @@ struct Relocation {
         Vec<D> trial = star.snap(x);
         for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
             const bool good = !(min_det(trial) < least);
-            if (good && (valid ? is_near(v, trial) : is_in_reach(v, star.to_global(trial)))) return star.to_global(trial);
+            const Vec<D> there = star.to_global(trial);
+            if (good && (valid ? nearness().is_near(v, there) : nearness().is_in_reach(v, there))) return there;
             trial = star.snap(star.position + 0.5 * (trial - star.position));
         }
         return load<D>(points + v * D);
     }
 
-    // Whether a vertex on the reference may be at x: in reach, with the facets around it near their shapes, or nearer than
-    // they are.
-    bool is_near(std::int64_t v, const Vec<D>& x) const {
-        const Vec<D> there = star.to_global(x), here = load<D>(points + v * D);
-        const double bound2 = parameters.freedom->bound2;
-        if (!is_in_reach(v, there)) return false;
-        if (is_within(bound2, v, there)) return true;
-        return !is_within(bound2, v, here) && is_within(deviation2_at(v, here), v, there);
-    }
-
-    // Calls look(p, shape, piece) for the middles of edges and triangles around v, if it is at x, while that returns true.
-    template <class F>
-    bool for_each_middle(std::int64_t v, const Vec<D>& x, const F& look) const {
-        const Freedom& freedom = *parameters.freedom;
-        for (std::int32_t i = freedom.around_offsets[v]; i < freedom.around_offsets[v + 1]; ++i) {
-            const std::int32_t* row = freedom.around.data() + 4 * static_cast<std::int64_t>(i);
-            const Vec<D> a = load<D>(points + static_cast<std::int64_t>(row[0]) * D);
-            if (!look(0.5 * (x + a), row[2], row[3])) return false;
-            if (row[1] < 0) continue;
-            const Vec<D> b = load<D>(points + static_cast<std::int64_t>(row[1]) * D);
-            if (!look((1.0 / 3.0) * (x + a + b), row[2], row[3])) return false;
-        }
-        return true;
-    }
-
-    // The largest distance^2 of them from their shapes.
-    double deviation2_at(std::int64_t v, const Vec<D>& x) const {
-        double largest = 0.0;
-        for_each_middle(v, x, [&](const Vec<D>& p, std::int32_t shape, std::int32_t piece) {
-            largest = std::max(largest, parameters.freedom->reference->template foot<D>(shape, p, piece).distance2);
-            return true;
-        });
-        return largest;
-    }
-
-    // Whether none is farther away: most of them are found to be near by their own pieces alone.
-    bool is_within(double bound2, std::int64_t v, const Vec<D>& x) const {
-        return for_each_middle(v, x, [&](const Vec<D>& p, std::int32_t shape, std::int32_t piece) {
-            return parameters.freedom->reference->template is_within<D>(bound2, shape, p, piece);
-        });
-    }
-
-    bool is_in_reach(std::int64_t v, const Vec<D>& x) const {
-        const double reach = parameters.max_move;
-        return !(reach < INFINITY) || norm2(x - load<D>(parameters.start + v * D)) <= reach * reach;
-    }
+    Nearness<D> nearness() const { return {points, parameters}; }
 
     bool loses_nothing(std::int64_t v, const Vec<D>& x) const {
         bool lost = false;
@@ -297,7 +246,7 @@ struct Relocation {
         if (share < LEAST_SHARE) return false;
         const Vec<D> x = share == 1.0 ? target : star.snap(star.position + share * (target - star.position));
         if (stars.elements != nullptr && !loses_nothing(v, x)) return false;
-        if (star.directions.curved() && !is_near(v, x)) return false;
+        if (star.directions.curved() && !nearness().is_near(v, star.to_global(x))) return false;
         return star.valid(x) && store(v, share == 1.0 ? start : star.to_global(x));
     }
 
@@ -305,17 +254,18 @@ struct Relocation {
     // of the neighbours; in a valid star, which stays valid.
     bool draw_back(std::int64_t v) {
         const Vec<D> here = load<D>(points + v * D);
-        if (is_within(parameters.freedom->bound2, v, here) || !star.valid(star.position)) return false;
+        const Nearness<D> near = nearness();
+        if (near.is_within(parameters.freedom->bound2, v, here) || !star.valid(star.position)) return false;
         Vec<D> best = here;
-        double least = deviation2_at(v, here);
+        double least = near.deviation2_at(v, here);
         for (const Vec<D>& target : {star.to_local(load<D>(parameters.start + v * D)), star.centre}) {
             Vec<D> trial = star.snap(target);
             for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
                 const Vec<D> there = star.to_global(trial);
-                const bool good = star.valid(trial) && is_in_reach(v, there) && is_within(DRAWN_BACK * least, v, there);
+                const bool good = star.valid(trial) && near.is_in_reach(v, there) && near.is_within(DRAWN_BACK * least, v, there);
                 if (good && (D == 2 || stars.elements == nullptr || loses_nothing(v, trial))) {
                     best = there;
-                    least = deviation2_at(v, there);
+                    least = near.deviation2_at(v, there);
                 }
                 trial = star.snap(star.position + 0.5 * (trial - star.position));
             }
@@ -384,21 +334,30 @@ struct Relocation {
     }
 };
 
-// blocks (count): numbers of the blocks to visit, of one colour.
-template <int D>
-Counts relocate(Move move, const StarsView& stars, double* points, std::uint8_t* states, std::int64_t n,
-                const std::int32_t* blocks, std::int64_t count, const Parameters& parameters, int threads) {
+// What a sweep works on.
+struct Sweep {
+    StarsView stars;
+    double* points;
+    std::uint8_t* states;
+    std::int64_t n;
+    Parameters parameters;
+};
+
+// blocks (count): numbers of the blocks to visit, of one colour. `prepare` gives a worker what else it needs.
+template <class Work, class F>
+Counts relocate(Move move, const Sweep& sweep, const std::int32_t* blocks, std::int64_t count, int threads, const F& prepare) {
     std::vector<Counts> counts(count);
     for_each_item(count, threads, [&](std::int64_t item) {
-        thread_local Relocation<D> work;
-        work.stars = stars;
-        work.points = points;
-        work.states = states;
-        work.parameters = parameters;
+        thread_local Work work;
+        work.stars = sweep.stars;
+        work.points = sweep.points;
+        work.states = sweep.states;
+        work.parameters = sweep.parameters;
+        prepare(work);
         Counts mine;  // of its own: threads that write side by side in memory wait for one another
         const std::int64_t begin = blocks[item] * BLOCK_SIZE;
-        for (std::int64_t v = begin; v < std::min(n, begin + BLOCK_SIZE); ++v)
-            if (states[v] == DUE) work.relocate(move, v, mine);
+        for (std::int64_t v = begin; v < std::min(sweep.n, begin + BLOCK_SIZE); ++v)
+            if (sweep.states[v] == DUE) work.relocate(move, v, mine);
         counts[item] = mine;
     });
     Counts total;

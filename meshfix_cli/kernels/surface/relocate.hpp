@@ -1,0 +1,303 @@
+// The moves of vertices on a surface: each in its tangent plane, where the star is one of a plane mesh, and from there back to
+// what it slides on. On a line or curve the fans of elements beside it are turned into one plane about its tangent.
+//
+// What is taken is judged in space: each element in the plane of its own area, seen from the side of its normal.
+#pragma once
+
+#include "moves/nearness.hpp"
+#include "moves/relocate.hpp"
+#include "surface/unfold.hpp"
+
+namespace meshfix {
+
+struct SurfaceRelocation {
+    StarsView stars;
+    double* points;         // (n, 3), moved in place
+    std::uint8_t* states;   // (n) HELD, DONE or DUE
+    const double* normals;  // (elements, 3) of the side from which each is seen
+    Parameters parameters;
+
+    Star<2> star{};
+    Programme<2> program{};
+    ActiveSet<2> active_set{};
+    Directions<3> directions{};
+    Plane plane{{}, {}};
+    Vec<3> base{};  // the origin of the star
+    struct Face {
+        Vec<3> from, to, normal;
+    };
+    std::vector<Face> faces{};  // of the star, in space
+    std::vector<std::uint16_t> beside{};
+
+    void gather(std::int64_t v) {
+        const Vec<3> here = at(v);
+        directions.set(*parameters.freedom, v, load<3>(parameters.start + v * 3), here);
+        star.faces_count = stars.offsets[v + 1] - stars.offsets[v];
+        faces.clear();
+        const std::int32_t* neighbours = stars.neighbours + stars.neighbour_offsets[v];
+        const std::uint16_t* face = stars.faces + static_cast<std::int64_t>(stars.offsets[v]) * 2;
+        for (int i = 0; i < star.faces_count; ++i)
+            faces.push_back({at(neighbours[face[2 * i]]), at(neighbours[face[2 * i + 1]]), normal_of(stars.corners[stars.offsets[v] + i])});
+        star.origin = {};
+        star.centre = {};
+        if (directions.count == 2)
+            lay_flat(v, here, face);
+        else
+            turn_about(v, here);
+        star.set_roles(stars, v);
+    }
+
+    Vec<3> at(std::int64_t v) const { return load<3>(points + v * 3); }
+
+    Vec<3> normal_of(std::int32_t corner) const {
+        const std::int64_t simplex = corner / 3;
+        return load<3>(normals + (stars.elements == nullptr ? simplex : stars.elements->owners[simplex]) * 3);
+    }
+
+    void lay_flat(std::int64_t v, const Vec<3>& here, const std::uint16_t* face) {
+        base = centroid<3>(stars, points, v);
+        plane = Plane(directions.axes[0], directions.axes[1]);
+        Vec<3> up{};
+        for (const Face& one : faces) up = up + one.normal;
+        if (dot(cross(plane.along, plane.across), up) < 0.0) plane.across = -1.0 * plane.across;
+        star.directions.set_anywhere();
+        star.faces = face;
+        star.neighbours.clear();
+        double size2 = 0.0;
+        for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i)
+            size2 = add(plane, at(stars.neighbours[i]), size2);
+        star.position = plane.coordinates(here - base);
+        star.take_unit(size2);
+    }
+
+    // The free vertex stays at the origin's height: each fan lies on its own side of the line.
+    void turn_about(std::int64_t v, const Vec<3>& here) {
+        const Vec<3> way = directions.axes[0];
+        base = here;
+        plane = Plane(way, {});
+        star.directions.count = 1;
+        star.directions.axes = {Vec<2>{1.0, 0.0}, Vec<2>{0.0, 1.0}};
+        star.directions.anchor = {};
+        star.directions.kept = {false, true};
+        star.directions.aligned = true;
+        star.directions.reference = nullptr;
+        star.neighbours.clear();
+        beside.clear();
+        double size2 = 0.0;
+        for (const Face& one : faces) {
+            Vec<3> side = cross(one.normal, way);
+            const double length = std::sqrt(norm2(side));
+            if (length > 0.0) side = (1.0 / length) * side;
+            for (const Vec<3>& p : {one.from, one.to}) {
+                beside.push_back(static_cast<std::uint16_t>(beside.size()));
+                size2 = add(Plane(way, side), p, size2);
+            }
+        }
+        star.faces = beside.data();
+        star.position = {};
+        star.take_unit(size2);
+        star.centre = {dot(way, centroid<3>(*parameters.freedom, directions, points, v) - here) / star.unit, 0.0};
+    }
+
+    double add(const Plane& in, const Vec<3>& p, double size2) {
+        star.neighbours.push_back(in.coordinates(p - base));
+        return std::max(size2, norm2(star.neighbours.back()));
+    }
+
+    // Where the vertex comes to be that goes to x, and where a position in space is in the star.
+    Vec<3> landing(const Vec<2>& x) const { return directions.onto(base + star.unit * plane.position(x)); }
+    Vec<2> local(const Vec<3>& p) const { return (1.0 / star.unit) * plane.coordinates(p - base); }
+
+    // The edges from p to a face, in the plane of the three.
+    Edges<2> unfolded(const Face& face, const Vec<3>& p) const {
+        const Vec<3> a = face.from - p, b = face.to - p, area = cross(a, b);
+        const double length = std::sqrt(norm2(a)), height = std::sqrt(norm2(area));
+        if (!(length > 0.0)) return {};
+        return {Vec<2>{length, 0.0}, Vec<2>{dot(a, b) / length, (dot(area, face.normal) < 0.0 ? -height : height) / length}};
+    }
+
+    double smallest_area(const Vec<3>& p) const {
+        double smallest = INFINITY;
+        for (const Face& face : faces) smallest = std::min(smallest, determinant(unfolded(face, p)));
+        return smallest;
+    }
+
+    bool valid(const Vec<3>& p) const { return quality(p) > 0.0; }
+
+    // The square of the smallest sine around p, or of the scaled Jacobian; -1 where an element is not valid.
+    double quality(const Vec<3>& p) const {
+        double smallest = INFINITY;
+        for (int i = 0; i < star.faces_count; ++i) {
+            const Edges<2> e = unfolded(faces[i], p);
+            if (!is_valid<2>(e, determinant(e), [&] { return Corners<2>{Vec<2>{}, e[0], e[1]}; })) return -1.0;
+            smallest = std::min(smallest, sine2_of(i, e));
+        }
+        return smallest;
+    }
+
+    double sine2_of(int i, const Edges<2>& e) const {
+        if (star.roles.empty()) return min_sine2(e, false);
+        const Roles<2>& roles = star.roles[i / LANES];
+        const double corner = roles.corner[i % LANES];
+        return corner > 0.5 ? corner_sine2<2>(e, corner, roles.weight[i % LANES], false) : min_sine2(e, false);
+    }
+
+    bool is_near(std::int64_t v, const Vec<3>& p) const {
+        const Nearness<3> nearness(points, parameters);
+        return nearness.is_bounded(v) ? nearness.is_near(v, p) : nearness.is_in_reach(v, p);
+    }
+
+    bool is_in_reach(std::int64_t v, const Vec<3>& p) const { return Nearness<3>(points, parameters).is_in_reach(v, p); }
+
+    bool makes_smaller(const Vec<3>& here, const Vec<3>& p) const {
+        if (parameters.min_det == -INFINITY) return false;
+        const double after = smallest_area(p);
+        return after < parameters.min_det && after < smallest_area(here);
+    }
+
+    bool store(std::int64_t v, const Vec<3>& p) {
+        bool changed = false;
+        for (int k = 0; k < 3; ++k) {
+            changed |= points[v * 3 + k] != p[k];
+            points[v * 3 + k] = p[k];
+        }
+        if (!changed) return false;
+        if (states[v] != HELD) states[v] = DUE;
+        make_neighbours_due(stars, states, v);
+        return true;
+    }
+
+    // The last place on the way to x, halved a few times, that is good.
+    template <class F>
+    bool go(std::int64_t v, Vec<2> x, const F& good) {
+        const Vec<2> from = star.position;
+        for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
+            const Vec<3> p = landing(x);
+            if (good(p)) return store(v, p);
+            x = from + 0.5 * (x - from);
+        }
+        return false;
+    }
+
+    // To where the smallest area is larger; heights where these make the star valid.
+    bool untangle(std::int64_t v, bool heights) {
+        if (!program.solve(star, heights)) return heights && untangle(v, false);
+        if (heights && !(program.smallest > 0.0)) return untangle(v, false);
+        const double least = smallest_area(at(v));
+        const bool was_valid = valid(at(v));
+        return go(v, program.position, [&](const Vec<3>& p) {
+            return smallest_area(p) >= least && (was_valid ? is_near(v, p) : is_in_reach(v, p));
+        });
+    }
+
+    bool to_centre(std::int64_t v) {
+        const bool was_valid = valid(at(v));
+        return go(v, star.centre, [&](const Vec<3>& p) { return was_valid ? is_near(v, p) : is_in_reach(v, p); });
+    }
+
+    bool combined_untangle(std::int64_t v) {
+        const bool moved = to_centre(v);
+        star.position = local(at(v));
+        return (valid(at(v)) ? false : untangle(v, false)) || moved;
+    }
+
+    // Section 3.3: smart Laplacian first, the active-set method where the star stays below the threshold; what is pinched
+    // almost flat the linear programme frees.
+    bool smooth(std::int64_t v, bool optimise, bool with_laplacian) {
+        const Vec<3> here = at(v);
+        double best = quality(here);
+        if (!(best > 0.0)) return false;
+        bool moved = false;
+        const auto better = [&](const Vec<3>& p) {
+            const double there = quality(p);
+            if (!(there > best) || !is_near(v, p) || makes_smaller(here, p)) return false;
+            best = there;
+            return true;
+        };
+        if (with_laplacian) moved = take(v, star.centre, 1, better);
+        if (optimise && best < LP_PINCHED_SINE2 && program.solve(star, true)) moved |= take(v, program.position, 1, better);
+        if (!optimise || !(best < parameters.threshold_sine2)) return moved;
+        double flat = min_sine2<2>(star, star.position, 0.0);
+        if (!(flat > 0.0)) return moved;
+        const Vec<2> x = active_set.improve(star, star.position, flat);
+        return (x != star.position && take(v, x, GUARD_TRIALS, better)) || moved;
+    }
+
+    template <class F>
+    bool take(std::int64_t v, Vec<2> x, int trials, const F& better) {
+        for (int trial = 0; trial < trials; ++trial) {
+            const Vec<3> p = landing(x);
+            if (better(p)) {
+                store(v, p);
+                star.position = local(p);
+                return true;
+            }
+            x = star.position + 0.5 * (x - star.position);
+        }
+        return false;
+    }
+
+    bool smooth_mean(std::int64_t v) {
+        const Vec<3> here = at(v);
+        const double before = quality(here), floor = parameters.threshold_sine2;
+        const double flat = min_sine2<2>(star, star.position, 0.0);
+        if (!(before > 0.0 && flat > 0.0)) return false;
+        const auto reachable = [&](const Vec<2>& x) { return local(landing(x)); };
+        const Vec<2> x = star.roles.empty() ? improve_mean<2, MeanRatio<2>>(star, flat, floor, reachable)
+                                            : improve_mean<2, ElementRatio<2>>(star, flat, floor, reachable);
+        if (x == star.position) return false;
+        const double least = std::min(before, floor) * (1.0 - SAME_SINE2);
+        return go(v, x, [&](const Vec<3>& p) { return quality(p) >= least && is_near(v, p) && !makes_smaller(here, p); });
+    }
+
+    // To where elements that are too far from their shapes are least so, of some places on the way to the start and to the
+    // mean of the neighbours; in a valid star, which stays valid.
+    bool draw_back(std::int64_t v) {
+        const Nearness<3> near(points, parameters);
+        if (!near.is_bounded(v) || near.is_within(parameters.freedom->bound2, v, at(v)) || !valid(at(v))) return false;
+        bool moved = false;
+        for (const Vec<2>& target : {local(load<3>(parameters.start + v * 3)), star.centre}) {
+            Vec<2> x = target;
+            for (int halvings = 0; halvings < GUARD_TRIALS; ++halvings) {
+                const Vec<3> p = landing(x);
+                if (valid(p) && near.is_in_reach(v, p) && near.is_within(DRAWN_BACK * near.deviation2_at(v, at(v)), v, p))
+                    moved |= store(v, p);
+                x = star.position + 0.5 * (x - star.position);
+            }
+        }
+        return moved;
+    }
+
+    bool raise_smallest(std::int64_t v) {
+        const double before = quality(at(v));
+        return before > 0.0 && before < parameters.threshold_sine2 && smooth(v, true, true);
+    }
+
+    bool relocated(Move move, std::int64_t v) {
+        switch (move) {
+            case Move::laplacian: return to_centre(v);
+            case Move::untangle: return untangle(v, false);
+            case Move::untangle_heights:
+            case Move::untangle_coefficients: return untangle(v, true);
+            case Move::combined_untangle: return combined_untangle(v);
+            case Move::smart_laplacian: return smooth(v, false, true);
+            case Move::combined_smooth: return smooth(v, true, true);
+            case Move::mean_ratio: return smooth_mean(v);
+            case Move::raise_smallest: return raise_smallest(v);
+            case Move::draw_back: return draw_back(v);
+            case Move::come_back: return false;
+        }
+        return false;
+    }
+
+    void relocate(Move move, std::int64_t v, Counts& counts) {
+        ++counts.visited;
+        if (parameters.freedom->anywhere(v)) return;
+        states[v] = DONE;
+        gather(v);
+        counts.moved += relocated(move, v);
+        if (move == Move::laplacian) states[v] = DUE;
+    }
+};
+
+}  // namespace meshfix

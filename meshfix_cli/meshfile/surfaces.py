@@ -1,0 +1,58 @@
+"""What of a file keeps the shape of a surface: which elements, lines and vertices end its patches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.mesh import ON_BOUNDARY
+from meshfix_cli.mesh.surface import Kept, laid_out
+from meshfix_cli.meshfile.document import BETWEEN, ON_CELLS, Document
+from meshfix_cli.meshfile.sliding import CellsBeside, joint, twins
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.curved import Smooth
+
+ON_FEATURES = "on features"
+
+
+def on_surface(
+    document: Document,
+    smooth: Smooth,
+    slide: Literal["none", "flat", "curved"] = "none",
+    interfaces: bool = True,
+    reference: NDArray[np.float64] | None = None,
+    threads: int = 1,
+) -> Document:
+    """Return a document of a surface whose vertices slide on it; see `surface.laid_out`.
+
+    Parameters
+    ----------
+    document : Document
+    smooth : Smooth
+        See `surface.Kept`.
+    slide : {"none", "flat", "curved"}
+        As well.
+    interfaces : bool
+        Whether that holds for the curves between regions as well.
+    reference : (k, d) float64, optional
+        See `laid_out`.
+    threads : int
+    """
+    mesh, topology = document.mesh, document.mesh.topology
+    labels = joint(topology.m, *document.regions) if document.regions else np.zeros(topology.m, dtype=np.int64)
+    cells = CellsBeside(document, np.empty((0, 2), dtype=np.int32))
+    held = cells.held | twins(document)
+    for reason, mask in document.holds.items():
+        if reason in (ON_BOUNDARY, ON_CELLS) or (interfaces and reason.startswith(BETWEEN)):
+            continue
+        held |= mask
+    kept = Kept(labels[topology.connectivity.rows], cells.lines, mesh.along_curve(held), smooth, slide)
+    found = laid_out(mesh, kept, reference, threads)
+    holds = dict(document.holds)
+    if slide == "none":
+        holds[ON_FEATURES] = topology.used & ~found.movable
+    return replace(document, mesh=found, holds=holds)

@@ -327,6 +327,10 @@ class Judge:
             else:
                 slides = {**self._slid(before, result), "ceiling_without_sliding": ceiling(start.held, self.threads)}
             more["facts"] = {**(more.get("facts") or {}), **slides}
+        if result.surface is not None and not self.brief:
+            from meshfix_cli.report.happened import crossings
+
+            notes += crossings(result, self.threads)
         return Report(
             name=document.name,
             command=command,
@@ -406,7 +410,7 @@ def repair(
         Nothing was written.
     """
     from meshfix_cli.quality.summary import displacement
-    from meshfix_cli.report.happened import of_boundary, what_happened
+    from meshfix_cli.report.happened import folded_at_first, of_boundary, what_happened
 
     judge.check(document)
     threads = judge.threads
@@ -419,6 +423,11 @@ def repair(
     result, written = files.write(document, after, output, put if document.ties is None else None)
     asked = method.smooth and not method.only_invalid and reference is None
     notes = (*slid, *what_happened(document, bool(asked), outcome, after, rounded), *written)
+    if result.surface is not None:
+        from meshfix_cli.meshfile.surfaces import laid_as
+
+        notes += folded_at_first(outcome)
+        document = laid_as(document, outcome.after)
     if result.quadratic is not None:
         notes += of_boundary(document.mesh, result, method.curving, reach, threads)
     stages = {"before": outcome.before, "untangled": outcome.untangled, "smoothed": result}

@@ -172,10 +172,13 @@ class Reference:
         `first` (s + 1,) ends with the number of pieces; `directions` (s,) is 2 for a surface and 1 for a curve.
         """
 
-    def nearest(self, points: Float64, shapes: Int32, threads: int) -> tuple[Float64, Float64]:
+    def let_walk(self, vertices: Int32) -> None:
+        """Let searches go from piece to piece: which corners (p, 3) are one."""
+
+    def nearest(self, points: Float64, shapes: Int32, threads: int, near: Int32 = ...) -> tuple[Float64, Float64]:
         """Put points (q, d) on their shapes (q,), which are rounded between corners.
 
-        The distances (q,) are those from the pieces as they are.
+        The distances (q,) are those from the pieces as they are; searches begin at pieces `near` (q,) if there are any.
         """
 
 def joined(pairs: Int32, n: int) -> Int32:

@@ -66,6 +66,8 @@ class Shapes:
         See `Smooth`.
     folds : int
         How often facets of inverted elements are folded back upon their neighbours: a tangled boundary is no reference.
+    walks : bool
+        Searches go from piece to piece, see kernels/mesh/reference.hpp.
     """
 
     vertices: Numbers
@@ -77,10 +79,15 @@ class Shapes:
     around: Numbers
     bound: float
     folds: int
+    walks: bool = False
 
     def kernel(self, corners: Array | None = None) -> kernels.Reference:
         """Return the same for the kernels, maybe with other corners; it is not kept: processes send their parts."""
-        return kernels.Reference(self.corners if corners is None else corners, self.ways, self.first, self.directions)
+        corners = self.corners if corners is None else corners
+        made = kernels.Reference(corners, self.ways, self.first, self.directions)
+        if self.walks:
+            made.let_walk(self.vertices)
+        return made
 
     def part(self, vertices: Numbers, number: Numbers, own: int) -> Shapes:
         """Return that of a part of the mesh, see `Freedom.part`, with all pieces; new numbers of vertices (k,)."""
@@ -88,26 +95,29 @@ class Shapes:
         around = self.around[places]
         around[:, :2] = np.where(around[:, :2] < 0, -1, number[around[:, :2]])
         same = self.vertices, self.corners, self.ways, self.first, self.directions
-        return Shapes(*same, offsets, around, self.bound, self.folds)
+        return Shapes(*same, offsets, around, self.bound, self.folds, self.walks)
 
-    def hausdorff(self, points: Array, threads: int = 1) -> float:
+    def distances(self, points: Array, threads: int = 1) -> tuple[float, Array]:
         """Return how far the shapes with their corners at points (k, d) are from the reference, at most, both ways.
 
-        That is found at vertices, and at the middles of edges and triangles.
+        That is found at vertices, and at the middles of edges and triangles. With it `deviations`.
         """
-        moved, largest = points[self.vertices], 0.0
-        for here, there in ((moved, self.corners), (self.corners, moved)):
-            other = self.kernel(np.ascontiguousarray(there))
-            for some in (*self._middles(here), *np.swapaxes(here, 0, 1)):
-                far = other.nearest(np.ascontiguousarray(some), self.shape, threads)[1]
-                largest = max(largest, float(far.max(initial=0)))
-        return largest
+        moved = points[self.vertices]
+        reference, other = self.kernel(), self.kernel(np.ascontiguousarray(moved))
+        deviations = self._far(reference, self._middles(moved), threads)
+        back = self._far(other, [*self._middles(self.corners), *np.swapaxes(self.corners, 0, 1)], threads)
+        vertices = self._far(reference, list(np.swapaxes(moved, 0, 1)), threads)
+        return float(max(far.max(initial=0) for far in (deviations, back, vertices))), deviations
 
     def deviations(self, points: Array, threads: int = 1) -> Array:
         """Tell how far (p,) the middles of each piece are from the reference, at most; its corners at points (k, d)."""
-        reference, middles = self.kernel(), self._middles(points[self.vertices])
-        far = [reference.nearest(np.ascontiguousarray(some), self.shape, threads)[1] for some in middles]
-        return np.asarray(np.max(far, axis=0))
+        return self._far(self.kernel(), self._middles(points[self.vertices]), threads)
+
+    def _far(self, reference: kernels.Reference, places: list[Array], threads: int) -> Array:
+        """Return how far (p,) some places, each (p, d) of the pieces, are from a reference at most."""
+        pieces = np.arange(len(self.shape), dtype=np.int32)
+        near = (np.ascontiguousarray(some) for some in places)
+        return np.asarray(np.max([reference.nearest(some, self.shape, threads, pieces)[1] for some in near], axis=0))
 
     @cached_property
     def shape(self) -> Numbers:
@@ -338,6 +348,6 @@ def _curved(
     offsets = np.concatenate([[0], np.cumsum(np.bincount(around[:, 0], minlength=len(points)))]).astype(np.int32)
     shapes = Shapes(
         vertices, points[vertices], ways, first, np.array(directions, dtype=np.uint8), offsets,
-        np.ascontiguousarray(around[:, 1:]), found.smooth.bound, found.folds,
+        np.ascontiguousarray(around[:, 1:]), found.smooth.bound, found.folds, found.given.normals is not None,
     )  # fmt: skip
     return Curved(shape, edges[shape[edges[:, 0]] >= 0], shapes)

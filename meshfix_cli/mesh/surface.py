@@ -192,8 +192,35 @@ def is_closed(topology: Topology) -> bool:
     return bool((mates >= 0).all()) and mesh.orientable
 
 
+def inward(mesh: Mesh) -> Mask:
+    """Mark the elements (m,) of closed parts of a surface that are seen from inside, as most of them are numbered."""
+    topology = mesh.topology
+    found = np.zeros(topology.m, dtype=bool)
+    connectivity, points = topology.connectivity, mesh.along_curve(mesh.points)
+    if not connectivity.orientable:
+        return found
+    open_parts = np.zeros(len(found), dtype=bool)
+    if connectivity.simplicial:
+        open_parts[(connectivity.mates < 0).any(axis=1)] = True
+    else:
+        open_parts[connectivity.facet_owners[connectivity.facet_mates < 0]] = True
+    part = connectivity.component
+    areas = kernels.area_vectors(points, *rows_of_elements(topology), 1)
+    middles = topology.centroids(points - points[0], np.arange(topology.m))
+    volumes = np.bincount(part, (areas * middles).sum(axis=1))
+    is_open = np.bincount(part, open_parts) > 0
+    found[connectivity.rows] = ((volumes < 0) & ~is_open)[part]
+    return found
+
+
+def crowded_edges(topology: Topology) -> Numbers:
+    """Return the edges (e, 2), in the numbers of the connectivity, of more than two elements."""
+    edges, count = np.unique(np.sort(topology.facets_between(None)[0], axis=1), axis=0, return_counts=True)
+    return edges[count > 2]
+
+
 def in_planes(mesh: Mesh, region: Mask, threads: int = 1) -> Mesh:
-    """Return a surface whose vertices move in planes, one for each, that what is around them tells; see `seen`.
+    """Return a surface whose vertices move in planes, their own or those that what is around them tells; see `seen`.
 
     Parameters
     ----------
@@ -209,6 +236,9 @@ def in_planes(mesh: Mesh, region: Mask, threads: int = 1) -> Mesh:
     least = np.eye(3)[np.abs(of_vertices).argmin(axis=1)]
     along = _unit(np.cross(least, of_vertices))
     axes = np.stack([along, np.cross(of_vertices, along), of_vertices], axis=1)
+    assert mesh.freedom is not None
+    flat = (mesh.freedom.degrees == 2) & ~mesh.freedom.curved
+    axes[flat] = mesh.freedom.axes[mesh.freedom.frame[flat]]
     free = (slides(mesh) | feigned(mesh, region)) & (of_vertices != 0).any(axis=1)
     k = len(points)
     frame = np.where(free, np.arange(k), -1).astype(np.int32)

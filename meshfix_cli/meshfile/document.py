@@ -30,6 +30,7 @@ FREE = "none"  # the name of no array of regions, by which interfaces are freed
 SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
 # Reasons to hold vertices that may slide all the same, where they are asked to.
 BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
+CROWDED = "on edges of more than two elements"
 OF_CURVED = "of curved elements"
 HALFWAY = "between corners of other elements"
 
@@ -194,12 +195,19 @@ class Document:
     def reversed_cells(self) -> dict[int, Turned]:
         """Return the cells, by the number of their run, whose numbering has the negative orientation.
 
+        Of surfaces those numbered against the rest, or where that encloses something and is seen from inside, the rest.
+
         Raises
         ------
         ReadError
             They are strips of triangles, in which no triangle can be renumbered alone.
         """
-        return self._turned(self.mesh.topology)
+        topology = self.mesh.topology
+        if self.mesh.surface is not None:
+            from meshfix_cli.mesh.surface import inward
+
+            topology = replace(topology, flipped=topology.flipped ^ inward(self.mesh))
+        return self._turned(topology)
 
     def oriented(self) -> Source:
         """Return the source for a format in which the numbering of cells tells their orientation."""
@@ -243,7 +251,7 @@ def build(
     if not source.oriented:  # the numbering says nothing
         mesh = replace(mesh, topology=replace(mesh.topology, flipped=np.zeros_like(mesh.topology.flipped)))
     topology = mesh.topology
-    holds, between = {ON_BOUNDARY: topology.boundary}, []
+    holds, between = _ends(mesh), []
     for key in () if free else source.regions:
         labels = solved.of_elements(source.arrays.cell[key])
         if key not in REGIONS and key != regions and not _are_labels(labels):
@@ -334,6 +342,20 @@ def _are_labels(values: NDArray[Any]) -> bool:
     if values.ndim != 1 or values.dtype.kind not in "biuf":
         return False
     return bool(values.dtype.kind in "biu" or (np.isfinite(values) & (values == np.round(values))).all())
+
+
+def _ends(mesh: Mesh) -> dict[str, NDArray[np.bool_]]:
+    """Return the vertices (n,) at which a mesh ends, for each reason."""
+    topology = mesh.topology
+    if mesh.surface is None:
+        return {ON_BOUNDARY: topology.boundary}
+    from meshfix_cli.mesh.surface import crowded_edges
+
+    edges, counts = crowded_edges(topology), np.zeros(len(topology.connectivity.vertices), dtype=bool)
+    counts[edges] = True
+    crowded = topology.of_vertices(counts)
+    ends = {ON_BOUNDARY: topology.boundary & ~crowded}
+    return {**ends, CROWDED: crowded} if crowded.any() else ends
 
 
 def _corners_of(solved: Solved, which: NDArray[np.bool_], n: int) -> NDArray[np.bool_]:

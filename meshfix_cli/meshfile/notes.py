@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 _CURVED = (
     "elements are curved, and are judged so; angles and ceilings are those of straight ones, and curved facets may meet"
 )
+_CURVED_SURFACE = (
+    "elements of second order are judged as the straight ones of their corners; those that are curved stay"
+)
 
 
 def notes_on(
@@ -55,10 +58,15 @@ def notes_on(
     if between:
         follow = counted(between, "node lies between corners and follows", "nodes lie between corners and follow")
         curved = mesh.quadratic is not None
-        notes.append(_CURVED if curved else f"no element is curved: {follow} them")
+        straight = f"no element is curved: {follow} them"
+        notes.append(_CURVED if curved else _CURVED_SURFACE if mesh.surface is not None else straight)
     isolated = topology.n - int(topology.used.sum()) - between - (together - places if copies is not None else 0)
     if isolated:
         notes.append(f"{counted(isolated, 'point belongs', 'points belong')} to no {one} and will not move")
+    if not topology.connectivity.orientable:
+        notes.append(
+            f"the {many} have no common orientation: where two that are numbered alike cannot meet, they are held"
+        )
     mirrored, which = int(topology.mirrored.sum()), ""
     if mirrored == topology.m and seen_from_above:
         which = "the element is" if mirrored == 1 else "the elements are"

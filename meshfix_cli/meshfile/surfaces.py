@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.mesh import ON_BOUNDARY
 from meshfix_cli.mesh.surface import Kept, laid_out
-from meshfix_cli.meshfile.document import BETWEEN, ON_CELLS, Document
+from meshfix_cli.meshfile.document import BETWEEN, CROWDED, ON_CELLS, Document
 from meshfix_cli.meshfile.sliding import CellsBeside, joint, twins
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.curved import Smooth
+    from meshfix_cli.mesh.mesh import Mesh
 
 ON_FEATURES = "on features"
 
@@ -47,12 +48,15 @@ def on_surface(
     cells = CellsBeside(document, np.empty((0, 2), dtype=np.int32))
     held = cells.held | twins(document)
     for reason, mask in document.holds.items():
-        if reason in (ON_BOUNDARY, ON_CELLS) or (interfaces and reason.startswith(BETWEEN)):
+        if reason in (ON_BOUNDARY, CROWDED, ON_CELLS) or (interfaces and reason.startswith(BETWEEN)):
             continue
         held |= mask
     kept = Kept(labels[topology.connectivity.rows], cells.lines, mesh.along_curve(held), smooth, slide)
-    found = laid_out(mesh, kept, reference, threads)
-    holds = dict(document.holds)
-    if slide == "none":
-        holds[ON_FEATURES] = topology.used & ~found.movable
-    return replace(document, mesh=found, holds=holds)
+    return laid_as(document, laid_out(mesh, kept, reference, threads))
+
+
+def laid_as(document: Document, mesh: Mesh) -> Document:
+    """Return a document whose vertices slide as they do in a mesh of the same surface."""
+    laid = replace(document.mesh, freedom=mesh.freedom, movable=mesh.movable, surface=mesh.surface)
+    on_features = mesh.topology.used & ~mesh.movable
+    return replace(document, mesh=laid, holds={**document.holds, ON_FEATURES: on_features})

@@ -27,8 +27,10 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     Returns
     -------
     (m,) float64
-        See `evaluate_at`; nan for elements of types that do not have the metric.
+        See `evaluate_at`; nan for elements of types that do not have the metric. Those of surfaces are seen in planes.
     """
+    if mesh.surface is not None:
+        mesh = mesh.unfolded()
     values = np.full(mesh.topology.m, np.nan)
     for block in mesh.topology.blocks:
         if block.element.key not in METRICS[name].elements:

@@ -336,7 +336,7 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
     Returns
     -------
     dict
-        "hausdorff", the distance between the two boundaries, see `Shapes.hausdorff`, in model units; "deviation", that
+        "hausdorff", the distance between the two boundaries, see `Shapes.distances`, in model units; "deviation", that
         of the middles of edges and triangles from the shape, "bound", within which steps keep it, and "beyond", how
         many edges of curves and triangles are not within that; "folds" of the reference, see `Shapes`; and by which
         share "size", the volume or area, and "boundary", its area or length, have changed. Of a surface it is its own
@@ -348,9 +348,9 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
     points, there = before.along_curve(before.points), after.along_curve(after.points)
     facets = after.topology.facets_between(None)[0] if after.surface is None else facets_of(after.topology)
     (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
-    deviations = shapes.deviations(there, threads)
+    hausdorff, deviations = shapes.distances(there, threads)
     return {
-        "hausdorff": shapes.hausdorff(there, threads),
+        "hausdorff": hausdorff,
         "deviation": float(deviations.max(initial=0)),
         "bound": shapes.bound,
         "beyond": int((deviations > shapes.bound * WITHIN).sum()),
@@ -400,7 +400,6 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     if len(stuck) == 0:
         return None
     if not mesh.topology.simplicial:
-        mesh = mesh if mesh.surface is None else mesh.unfolded(threads)
         return float(evaluate("scaled_jacobian", mesh)[mesh.topology.connectivity.rows[stuck]].min())
     judged = mesh.judged(stuck)
     return math.degrees(float(judged.angles(mesh.along_curve(mesh.points), threads).min()))

@@ -203,12 +203,13 @@ def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArr
     """Return the picture of the stages of a mesh; `inverted` and `worst` are rows of its elements."""
     result, mesh = list(meshes.items())[-1]
     boundary, facets, coarse = _coarser(*_boundary(mesh))
-    whole = mesh.dimension == 2 and mesh.topology.m <= MOST_CELLS
+    flat = mesh.points.shape[1] == 2
+    whole = flat and mesh.topology.m <= MOST_CELLS
     drawn = partial(_whole_state, _numbered(mesh, np.arange(mesh.topology.m))) if whole else _partial_state
     return Scene(
         boundary=boundary,
         facets=facets,
-        creases=np.empty((0, 2), dtype=np.int32) if coarse or mesh.dimension == 2 else _creases(boundary, facets),
+        creases=np.empty((0, 2), dtype=np.int32) if coarse or flat else _creases(boundary, facets),
         coarse=coarse,
         states={
             name: _with_off(drawn(mesh, inverted[name], worst if name == result else worst[:0]), mesh)
@@ -273,10 +274,11 @@ def _with_off(state: State, mesh: Mesh) -> State:
         return state
     points = mesh.along_curve(mesh.points)
     shares = shapes.deviations(points) / (shapes.bound or 1.0)
-    rows = np.flatnonzero(shapes.directions[shapes.shape] == mesh.dimension - 1)
+    space = mesh.points.shape[1]
+    rows = np.flatnonzero(shapes.directions[shapes.shape] == space - 1)
     rows = rows[np.argsort(-shares[rows], kind="stable")][:MOST_FACETS]
     classes = np.searchsorted([least for _, least in OFF], shares[rows]) - 1
-    key = FACETS[mesh.dimension]
+    key = FACETS[space]
     groups = [{key: shapes.vertices[rows[classes == i]]} for i in range(len(OFF))]
     places, compact = _compact(points, groups)
     off = [{key: cells[key] + len(state.points) for key in cells} for cells in compact]
@@ -293,10 +295,12 @@ def _compact(points: Points, groups: Sequence[Cells]) -> tuple[Points, list[dict
 
 
 def _boundary(mesh: Mesh) -> tuple[Points, dict[str, Rows]]:
-    """Return the vertices (k, d) and the oriented facets of the boundary."""
+    """Return the vertices (k, d) and the oriented facets of the boundary; of a surface all elements."""
     topology, connectivity = mesh.topology, mesh.topology.connectivity
     facets: dict[str, Rows] = {}
-    if isinstance(topology, MixedTopology):
+    if mesh.surface is not None:
+        facets = _numbered(mesh, np.arange(topology.m))
+    elif isinstance(topology, MixedTopology):
         alone = topology.facets[connectivity.facet_mates < 0]
         size = (alone >= 0).sum(axis=1)
         for count in np.unique(size).tolist():

@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import counted
+from meshfix_cli.mesh.surface import facets_of
 from meshfix_cli.solve.quadratic import giving_way
 
 if TYPE_CHECKING:
@@ -53,3 +55,22 @@ def what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh
     written = "" if after is outcome.after else ", so the mesh before that is written"
     inverted = counted(rounded, "element", "elements")
     return (f"positions rounded to the file's {kind} invert {inverted}{written}{way_out}",)
+
+
+def folded_at_first(outcome: Outcome) -> tuple[str, ...]:
+    """Say from what the shape of a surface was known that was folded and had no reference."""
+    surface = outcome.before.surface
+    if surface is None or surface.has_reference or outcome.records[0].inverted == 0:
+        return ()
+    return ("the surface was folded: its shape is what its points tell; --reference names the mesh before",)
+
+
+def crossings(mesh: Mesh, threads: int) -> tuple[str, ...]:
+    """Say where a surface crosses itself, which is left as it is."""
+    facets = facets_of(mesh.topology)
+    corners = facets[:, 3:4] >= 0
+    triangles = np.concatenate([facets[:, :3], facets[corners.ravel()][:, [0, 2, 3]]]) if corners.size else facets
+    pairs = kernels.crossings(mesh.along_curve(mesh.points), np.ascontiguousarray(triangles), threads)
+    if not len(pairs):
+        return ()
+    return (f"the surface crosses itself, at {counted(len(pairs), 'pair', 'pairs')} of elements, and is left so there",)

@@ -76,7 +76,7 @@ def plot(report: Report, drawn: Figures, target: Path) -> None:
 def _figure(report: Report, drawn: Figures) -> Figure:
     from matplotlib.figure import Figure
 
-    flat = report.mesh.dimension == 2
+    flat = report.mesh.points.shape[1] == 2
     charts = 1 if drawn.convergence is None else 3
     pictures = len(drawn.scene.states) if flat else 0
     width = WIDTH if max(charts, pictures) > 1 else WIDTH / 2

@@ -328,9 +328,14 @@ void init_reference(Reference* self, const Matrices<const double>& corners, cons
                          copied(directions));
 }
 
-// For points (q, D) each on its shape (q,): the nearest positions (q, D), and the distances (q,) from the pieces themselves.
+void let_walk(Reference& self, const Matrix<const std::int32_t>& vertices) {
+    if (self.dimension() != 3 || vertices.shape(1) != 3) throw nb::value_error("only surfaces are walked on");
+    self.let_walk(vertices.data());
+}
+
+// For points (q, D) each on its shape (q,), from pieces `near` (q,), if there are any: the nearest positions (q, D), and the distances (q,) from the pieces themselves.
 auto nearest_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
-                int threads) {
+                int threads, const std::int32_t* near) {
     const std::size_t count = points.shape(0), d = points.shape(1);
     if (static_cast<int>(d) != self.dimension() || shapes.shape(0) != count)
         throw nb::value_error("the points are of another reference");
@@ -340,7 +345,8 @@ auto nearest_py(const Reference& self, const Matrix<const double>& points, const
         for_each_range(static_cast<std::int64_t>(count), 1024, threads,
                        [&](std::int64_t begin, std::int64_t end, std::int64_t) {
                            for (std::int64_t i = begin; i < end; ++i) {
-                               const Foot<D> foot = self.foot<D>(shapes.data()[i], load<D>(points.data() + i * D));
+                               const Foot<D> foot = self.foot<D>(shapes.data()[i], load<D>(points.data() + i * D),
+                                                                    near == nullptr ? Reference::ANY : near[i]);
                                const Vec<D> x = self.rounded<D>(shapes.data()[i], foot);
                                std::copy(x.begin(), x.end(), there.begin() + i * D);
                                distances[i] = std::sqrt(foot.distance2);
@@ -349,6 +355,12 @@ auto nearest_py(const Reference& self, const Matrix<const double>& points, const
         return 0;
     });
     return std::make_pair(to_numpy(std::move(there), d), to_numpy(std::move(distances)));
+}
+
+auto nearest_near_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
+                     int threads, const Vector<const std::int32_t>& near) {
+    if (near.shape(0) != points.shape(0)) throw nb::value_error("the pieces are of other points");
+    return nearest_py(self, points, shapes, threads, near.data());
 }
 
 // Numbers things (n,) so that those which pairs (p, 2) join have one number, by the first of each.
@@ -377,7 +389,11 @@ void bind_mesh(nb::module_& m) {
     nb::class_<Reference>(m, "Reference")
         .def("__init__", &init_reference, "corners"_a.noconvert(), "ways"_a.noconvert(), "first"_a.noconvert(),
              "directions"_a.noconvert())
-        .def("nearest", &nearest_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a);
+        .def("let_walk", &let_walk, "vertices"_a.noconvert())
+        .def("nearest", [](const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
+                           int threads) { return nearest_py(self, points, shapes, threads, nullptr); },
+             "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a)
+        .def("nearest", &nearest_near_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert());
     m.def("joined", &joined_py, "pairs"_a.noconvert(), "n"_a);
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstdint>
 #include <numeric>
+#include <tuple>
 #include <vector>
 
 #include "mesh/simplex.hpp"
@@ -32,15 +33,45 @@ class Reference {
 
     Reference(int dimension, std::vector<double> corners, std::vector<double> ways, const std::vector<std::int32_t>& first,
               std::vector<std::uint8_t> directions)
-        : dimension_(dimension), corners_(std::move(corners)), ways_(std::move(ways)), directions_(std::move(directions)) {
+        : dimension_(dimension), corners_(std::move(corners)), ways_(std::move(ways)), directions_(std::move(directions)),
+          first_(first) {
         order_.resize(first.back());
         std::iota(order_.begin(), order_.end(), 0);
+        centres_.resize(order_.size() * dimension_);
+        for (std::size_t i = 0; i < corners_.size(); ++i)
+            centres_[i / (dimension_ * dimension_) * dimension_ + i % dimension_] += corners_[i];
         for (std::size_t s = 0; s + 1 < first.size(); ++s) {
             roots_.push_back(static_cast<std::int32_t>(nodes_.size()));
             if (dimension_ == 2)
                 build<2>(first[s], first[s + 1]);
             else
                 build<3>(first[s], first[s + 1]);
+        }
+        std::vector<double>().swap(centres_);
+    }
+
+    // Lets searches go from piece to piece, where they begin at one. vertices (p, 3): numbers that tell which corners are one.
+    void let_walk(const std::int32_t* vertices) {
+        struct Side {
+            std::uint64_t ends;
+            std::int32_t shape, place;  // place: 3 * piece + side
+        };
+        std::vector<Side> sides;
+        for (std::size_t shape = 0; shape < shapes(); ++shape)
+            for (std::int32_t piece = first_[shape]; directions_[shape] == 2 && piece < first_[shape + 1]; ++piece)
+                for (int i = 0; i < 3; ++i) {
+                    const auto a = static_cast<std::uint32_t>(vertices[piece * 3 + i]), b = static_cast<std::uint32_t>(vertices[piece * 3 + (i + 1) % 3]);
+                    sides.push_back({static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b), static_cast<std::int32_t>(shape), piece * 3 + i});
+                }
+        std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
+            return std::tie(a.shape, a.ends, a.place) < std::tie(b.shape, b.ends, b.place);
+        });
+        beside_.assign(static_cast<std::size_t>(first_.back()) * 3, -1);
+        for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+            const Side &one = sides[i], &other = sides[i + 1];
+            if (one.shape != other.shape || one.ends != other.ends) continue;
+            beside_[one.place] = other.place / 3;
+            beside_[other.place] = one.place / 3;
         }
     }
 
@@ -49,10 +80,15 @@ class Reference {
     int directions(std::int32_t shape) const { return directions_[shape]; }
 
     // `near`: a piece of the shape from which the search begins, or `ANY`; of pieces that are equally near the first is taken.
+    // Where searches walk, and come to a place in a piece that is nearer than this is large, that is it: what slides never
+    // jumps to where the shape comes near to itself.
     template <int D>
     Foot<D> foot(std::int32_t shape, const Vec<D>& p, std::int64_t near = ANY) const {
         Foot<D> best = any_foot<D>(shape);
-        if (near != ANY) look<D>(shape, static_cast<std::int32_t>(near), p, best);
+        if (near != ANY) {
+            const bool inside = walk<D>(shape, static_cast<std::int32_t>(near), p, best, -1.0);
+            if (inside && best.distance2 <= size2<D>(best.piece)) return best;
+        }
         search<D>(shape, p, best, 0.0);
         return best;
     }
@@ -61,7 +97,7 @@ class Reference {
     template <int D>
     bool is_within(double bound2, std::int32_t shape, const Vec<D>& p, std::int64_t near) const {
         Foot<D> best = any_foot<D>(shape);
-        look<D>(shape, static_cast<std::int32_t>(near), p, best);
+        walk<D>(shape, static_cast<std::int32_t>(near), p, best, bound2);
         if (best.distance2 <= bound2) return true;
         best.distance2 = std::nextafter(bound2, INFINITY);
         search<D>(shape, p, best, bound2);
@@ -111,6 +147,7 @@ class Reference {
 
    private:
     static constexpr std::int32_t LEAF = 4;
+    static constexpr int STEPS = 16;
 
     // The left child is the next node; no right child: a leaf.
     struct Node {
@@ -141,6 +178,48 @@ class Reference {
             waiting[count++] = far;
             waiting[count++] = near;
         }
+    }
+
+    // From piece to piece across the side that is between it and a position, until that is over one, or near enough. Whether
+    // it is over one.
+    template <int D>
+    bool walk(std::int32_t shape, std::int32_t piece, const Vec<D>& p, Foot<D>& best, double enough2) const {
+        if constexpr (D == 3) {
+            for (int step = 0; !beside_.empty() && directions_[shape] == 2 && step < STEPS; ++step) {
+                std::array<double, 3> weights;
+                if (!weigh(piece, p, weights)) break;
+                const int least = static_cast<int>(std::min_element(weights.begin(), weights.end()) - weights.begin());
+                if (weights[least] >= 0.0) {
+                    take<3>(piece, weights, p, best);
+                    return true;
+                }
+                for (int i = 0; i < 3; ++i)
+                    if (weights[(i + 2) % 3] < 0.0) look_along<3>(piece, i, (i + 1) % 3, p, best);
+                if (best.distance2 <= enough2) return false;
+                piece = beside_[piece * 3 + (least + 1) % 3];
+                if (piece < 0) return false;
+            }
+            if (!beside_.empty()) return false;
+        }
+        look<D>(shape, piece, p, best);
+        return false;
+    }
+
+    // The weights of the corners of a triangle at the nearest point of its plane; false: it has no area.
+    bool weigh(std::int32_t piece, const Vec<3>& p, std::array<double, 3>& weights) const {
+        const Vec<3> a = at<3>(corners_, piece, 0), b = at<3>(corners_, piece, 1) - a, c = at<3>(corners_, piece, 2) - a;
+        const Vec<3> normal = cross(b, c), off = p - a;
+        const double area2 = norm2(normal);
+        if (!(area2 > 0.0)) return false;
+        weights[1] = dot(cross(off, c), normal) / area2;
+        weights[2] = dot(cross(b, off), normal) / area2;
+        weights[0] = 1.0 - weights[1] - weights[2];
+        return true;
+    }
+
+    template <int D>
+    double size2(std::int64_t piece) const {
+        return std::max(norm2(at<D>(corners_, piece, 1) - at<D>(corners_, piece, 0)), norm2(at<D>(corners_, piece, D - 1) - at<D>(corners_, piece, 0)));
     }
 
     // Of a position that is at no distance from anything, for it is no number.
@@ -176,11 +255,7 @@ class Reference {
         int axis = 0;
         for (int k = 1; k < D; ++k)
             if (node.high[k] - node.low[k] > node.high[axis] - node.low[axis]) axis = k;
-        const auto centre = [&](std::int32_t piece) {
-            double sum = 0.0;
-            for (int c = 0; c < D; ++c) sum += at<D>(corners_, piece, c)[axis];
-            return sum;
-        };
+        const auto centre = [&](std::int32_t piece) { return centres_[static_cast<std::size_t>(piece) * D + axis]; };
         const std::int32_t middle = begin + (end - begin) / 2;
         std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
                          [&](std::int32_t a, std::int32_t b) {
@@ -204,13 +279,10 @@ class Reference {
 
     // Whether the nearest point of the plane of a triangle is in it.
     bool look_inside(std::int32_t piece, const Vec<3>& p, Foot<3>& best) const {
-        const Vec<3> a = at<3>(corners_, piece, 0), b = at<3>(corners_, piece, 1) - a, c = at<3>(corners_, piece, 2) - a;
-        const Vec<3> normal = cross(b, c), off = p - a;
-        const double area2 = norm2(normal);
-        if (!(area2 > 0.0)) return false;
-        const double v = dot(cross(off, c), normal) / area2, w = dot(cross(b, off), normal) / area2, u = 1.0 - v - w;
-        if (!(u >= 0.0 && v >= 0.0 && w >= 0.0)) return false;
-        take<3>(piece, {u, v, w}, p, best);
+        std::array<double, 3> weights;
+        if (!weigh(piece, p, weights)) return false;
+        if (!(weights[0] >= 0.0 && weights[1] >= 0.0 && weights[2] >= 0.0)) return false;
+        take<3>(piece, weights, p, best);
         return true;
     }
 
@@ -234,8 +306,9 @@ class Reference {
     }
 
     int dimension_;
-    std::vector<double> corners_, ways_;
+    std::vector<double> corners_, ways_, centres_{};  // centres_: sums of corners, while trees are built
     std::vector<std::uint8_t> directions_;
+    std::vector<std::int32_t> first_, beside_{};  // beside_ (p, 3): the pieces at the sides, -1: none; or empty
     std::vector<std::int32_t> order_, roots_;
     std::vector<Node> nodes_{};
 };

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from meshfix_cli.errors import RequirementError, WriteError, listed, together
 from meshfix_cli.mesh.elements import counted, words
 from meshfix_cli.quality.metrics import having, types_with
+from meshfix_cli.solve import strategies
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import SMOOTH, Smooth, plan
 
@@ -43,7 +44,7 @@ Curving = Literal["hold", "relax"]
 CURVINGS: tuple[Curving, ...] = get_args(Curving)
 SLIDES: tuple[Sliding, ...] = get_args(Sliding)  # the later, the more vertices move
 NEAR_CEILING = 0.9  # of it: from there on it is what limits the smallest angle or scaled Jacobian
-MAX_DEVIATION = Distance(0.03, in_h=True)
+MAX_DEVIATION = Distance(strategies.MAX_DEVIATION, in_h=True)
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,7 @@ class Method:
     only_invalid: bool = False
     slide: Sliding = "none"
     slide_interfaces: bool = True
-    feature_angle: float = 40.0
+    feature_angle: float = strategies.FEATURE_ANGLE
     max_deviation: Distance = MAX_DEVIATION
     curving: Curving = "hold"
 
@@ -228,9 +229,10 @@ class Method:
         if mesh.quadratic is not None:  # what is impossible may change, as its boundary may
             found = drain(watch(self._curved_steps(mesh, reach, threads, reference)))
             return Outcome(*found, find_obstacles(found[2], threads))
+        if mesh.surface is not None:  # what a fold feigns to be features is free in the end
+            found = drain(watch(self._surface_steps(mesh, reach, threads)))
+            return Outcome(*found, find_obstacles(found[2], threads))
         obstacles = find_obstacles(mesh, threads)
-        if mesh.surface is not None:
-            return Outcome(*drain(watch(self._surface_steps(mesh, reach, threads))), obstacles)
         run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
         return Outcome(*drain(watch(run)), obstacles)
 
@@ -240,7 +242,7 @@ class Method:
 
         smoothing = partial(self.steps, reach=reach, threads=threads)
         untangling = partial(replace(self, smooth=0).steps, reach=reach, threads=threads)
-        return surface_steps(mesh, untangling, smoothing, threads)
+        return surface_steps(mesh, untangling, smoothing, reach, threads)
 
     def _curved_steps(
         self, mesh: Mesh, reach: float, threads: int, reference: NDArray[np.float64] | None = None
@@ -426,7 +428,7 @@ def repair(
     if result.surface is not None:
         from meshfix_cli.meshfile.surfaces import laid_as
 
-        notes += folded_at_first(outcome)
+        notes += folded_at_first(outcome, reference is not None)
         document = laid_as(document, outcome.after)
     if result.quadratic is not None:
         notes += of_boundary(document.mesh, result, method.curving, reach, threads)

@@ -153,7 +153,8 @@ def _write_inp(path: Path, points: Points, hexahedra: Simplices, name: str, titl
 
 
 def _write_obj(path: Path, points: Points, triangles: Simplices, title: str) -> None:
-    lines = [f"# {title}", "o plate", *[f"v {row} 0" for row in _rows(points)]]
+    flat = " 0" if points.shape[1] == 2 else ""
+    lines = [f"# {title}", "o plate", *[f"v {row}{flat}" for row in _rows(points)]]
     lines += [f"f {row}" for row in _rows(triangles + 1)]
     path.write_text("\n".join(lines) + "\n")
 
@@ -202,7 +203,23 @@ def main() -> None:
     tangled = np.where(interface[:, None], points, tangled)
     title = "flat plate of two materials, by generate.py, 10 percent moved by h but for the interface"
     _write_msh(folder / "two_materials.msh", tangled.round(6), [("tetra", tets)], groups, ["steel", "copper"], title)
+    _write_shell(folder)
     _write_other_elements(folder)
+
+
+def lifted(points: Points) -> Points:
+    """Return points of the plane on a shell over it that is bent both ways."""
+    x, y = points.T
+    return np.column_stack([points, 0.4 * np.cos(x) * np.cos(1.5 * y)])
+
+
+def _write_shell(folder: Path) -> None:
+    """Write a shell with two holes, and the same tangled along its surface."""
+    points, triangles = plate(0.2)
+    _write_obj(folder / "shell.obj", lifted(points).round(6), triangles, "shell with two holes, by generate.py")
+    tangled = _tangled(points, triangles, 25, 1.5)
+    title = "shell.obj with 25 percent moved along it by 1.5h, by generate.py"
+    _write_obj(folder / "shell_tangled.obj", lifted(tangled).round(6), triangles, title)
 
 
 def _write_other_elements(folder: Path) -> None:

@@ -216,7 +216,7 @@ def build_mixed(points: NDArray[np.float64], blocks: Blocks, used: NDArray[np.in
     flipped = turned_over(mesh, points, shape)
     mesh.take_apart(flipped, threads)
     rows = np.zeros_like(flipped)
-    rows[mesh.rows] = flipped
+    rows[mesh.rows] = flipped & mesh.orientable
     return MixedTopology(len(points), source, rows, mesh)
 
 

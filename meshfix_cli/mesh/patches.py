@@ -43,7 +43,7 @@ class Constraints:
     broken : (k,) bool
         The vertices of inverted elements.
     normals : (f, 3) float64, optional
-        Unit normals that facets in space should have, where they may be turned over.
+        Unit normals that facets of a surface should have: the facets may be turned over.
     """
 
     facets: Numbers
@@ -169,8 +169,6 @@ class _Surface:
         self.points, self.given, self.tolerance = points, given, tolerance
         self.normals, self.bent = normals_of(points, given.facets, tolerance)
         self.areas = np.linalg.norm(self.normals, axis=1)
-        if given.normals is not None:
-            self.normals = given.normals * self.areas[:, None]
 
     def patches(self, pairs: Numbers) -> tuple[Mask, Numbers]:
         """Return which pairs (p, 2) of facets that meet are of one patch, and a number (f,) for the patch of each.

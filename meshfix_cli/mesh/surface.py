@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Numbers = NDArray[np.int32]
+ASTRAY = 0.5  # mean edge lengths from a reference: where most vertices are farther away, it tells nothing of a surface
 SURFACE_RINGS = 1  # of neighbours whose stars give a vertex its normal, where elements are turned over
 
 
@@ -138,7 +139,9 @@ def joined_elements(topology: Topology) -> Numbers:
     return np.stack([mesh.facet_owners[here], mesh.facet_owners[mates[here]]], axis=1)
 
 
-def laid_out(mesh: Mesh, kept: Kept, reference: Array | None = None, threads: int = 1) -> Mesh:
+def laid_out(
+    mesh: Mesh, kept: Kept, reference: Array | None = None, threads: int = 1, region: Mask | None = None
+) -> Mesh:
     """Return a surface whose vertices slide on it, within their patches.
 
     Parameters
@@ -147,8 +150,10 @@ def laid_out(mesh: Mesh, kept: Kept, reference: Array | None = None, threads: in
     kept : Kept
     reference : (k, 3) float64, optional
         Where the vertices, in the order of the connectivity, were before they moved: it gives the normals, the patches
-        and the shape. Default: where they are.
+        and the shape, unless most of them are far from it. Default: where they are.
     threads : int
+    region : (k,) bool, optional
+        Where a tangle was, whose traces are no features.
     """
     surface, topology = mesh.surface, mesh.topology
     assert surface is not None
@@ -160,10 +165,15 @@ def laid_out(mesh: Mesh, kept: Kept, reference: Array | None = None, threads: in
     judged = replace(mesh, surface=Surface(normals)).judged()
     inverted[judged.check(points, threads)[0]] = True
     broken[judged.vertices(inverted)] = True
-    freedom = freedom_of(points, Constraints(facets, kept.labels, kept.lines, inverted, broken, normals), kept.smooth)
-    if reference is not None:
-        off = freedom.rounded(now, threads)[1] > kept.smooth.bound
-        kept = replace(kept, held=kept.held | off)
+    given = Constraints(facets, kept.labels, kept.lines, inverted, broken, normals)
+    freedom = freedom_of(points, given, kept.smooth)
+    if reference is not None and _is_elsewhere(freedom, now, ASTRAY * mesh.mean_edge_length(threads), threads):
+        return laid_out(mesh, kept, None, threads, region)
+    if region is not None:
+        found = replace(mesh, freedom=freedom, surface=Surface(normals, kept))
+        traces = np.append(feigned(found, region), False)[facets].any(axis=1)
+        smoothed = np.where(traces[:, None], _seen_around(mesh, threads)[1], normals)
+        freedom = freedom_of(points, replace(given, normals=smoothed), kept.smooth) if traces.any() else freedom
     degrees = freedom.degrees
     moves = degrees == 2
     if kept.slide != "none":
@@ -172,6 +182,27 @@ def laid_out(mesh: Mesh, kept: Kept, reference: Array | None = None, threads: in
     return replace(
         mesh, freedom=freedom, movable=movable, surface=Surface(read_only(normals), kept, reference is not None)
     )
+
+
+def laid_by_default(mesh: Mesh, smooth: Smooth, reference: Array | None = None, threads: int = 1) -> Mesh:
+    """Return a surface whose vertices slide on it, but for features, where nobody has told yet what these are.
+
+    See `laid_out`; what is held is what does not move.
+    """
+    surface, topology = mesh.surface, mesh.topology
+    assert surface is not None
+    if surface.kept is not None and reference is None:
+        return mesh
+    held = mesh.along_curve(~mesh.movable & ~topology.boundary)
+    lines = np.empty((0, 2), dtype=np.int32)
+    kept = surface.kept or Kept(np.zeros(topology.m, dtype=np.int64), lines, held, smooth, "none")
+    return laid_out(mesh, kept, reference, threads)
+
+
+def _is_elsewhere(freedom: Freedom, points: Array, far: float, threads: int) -> bool:
+    """Whether most of the points (k, 3) that slide on curves and surfaces are far from these."""
+    off = freedom.rounded(points, threads)[1][freedom.curved] > far
+    return bool(2 * off.sum() > len(off))
 
 
 def facets_of(topology: Topology) -> Numbers:
@@ -282,9 +313,10 @@ def feigned(mesh: Mesh, region: Mask) -> Mask:
     """
     surface, freedom, topology = mesh.surface, mesh.freedom, mesh.topology
     assert surface is not None and surface.kept is not None and freedom is not None
-    along, k = freedom.degrees == 1, len(region)
+    ends = mesh.along_curve(topology.boundary)
+    along, k = (freedom.degrees == 1) & ~ends, len(region)
     start, end = topology.edges()
     beside = np.bincount(start, along[end], k) + np.bincount(end, along[start], k)
-    held = surface.kept.held | mesh.along_curve(topology.boundary)
+    held = surface.kept.held | ends
     lone = np.where(along, beside == 0, (freedom.degrees == 0) & (beside < 2))
     return np.asarray(region & lone & ~held)

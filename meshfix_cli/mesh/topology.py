@@ -373,5 +373,5 @@ def build_topology(
     rows = np.zeros_like(flipped)
     if flipped.any():
         mesh.flip(flipped, threads)
-        rows[mesh.rows] = flipped
+        rows[mesh.rows] = flipped & mesh.orientable
     return Topology(n, source, rows, mesh)

@@ -27,7 +27,7 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     Returns
     -------
     (m,) float64
-        See `evaluate_at`; nan for elements of types that do not have the metric. Those of surfaces are seen in planes.
+        See `evaluate_at`; nan for elements of types that do not have it. Those of surfaces are seen in planes.
     """
     if mesh.surface is not None:
         mesh = mesh.unfolded()

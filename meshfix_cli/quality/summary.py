@@ -13,7 +13,6 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.judged import INSIDE, VALID
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.mesh.surface import facets_of, is_closed, joined_elements
 from meshfix_cli.mesh.topology import Block, Topology
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
@@ -168,6 +167,8 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
 
 def _summarise_surface(mesh: Mesh, metrics: Sequence[str], threads: int) -> Summary:
     """Evaluate a surface: its elements one by one in their planes, and the edges at which one is turned over."""
+    from meshfix_cli.mesh.surface import joined_elements
+
     summary = summarise(mesh.unfolded(threads), metrics, threads)
     wrong = np.zeros(mesh.topology.m, dtype=bool)
     wrong[summary.inverted_elements] = True
@@ -346,7 +347,11 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
     if shapes is None:
         return dict.fromkeys(("hausdorff", "deviation", "bound", "beyond", "folds", "size", "boundary"), 0)
     points, there = before.along_curve(before.points), after.along_curve(after.points)
-    facets = after.topology.facets_between(None)[0] if after.surface is None else facets_of(after.topology)
+    facets, encloses = after.topology.facets_between(None)[0], True
+    if after.surface is not None:
+        from meshfix_cli.mesh.surface import facets_of, is_closed
+
+        facets, encloses = facets_of(after.topology), is_closed(after.topology)
     (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
     hausdorff, deviations = shapes.distances(there, threads)
     return {
@@ -355,7 +360,7 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
         "bound": shapes.bound,
         "beyond": int((deviations > shapes.bound * WITHIN).sum()),
         "folds": shapes.folds,
-        "size": _change(size, new_size) if after.surface is None or is_closed(after.topology) else None,
+        "size": _change(size, new_size) if encloses else None,
         "boundary": _change(boundary, new_boundary),
     }
 

@@ -32,6 +32,7 @@ def to_json(report: Report) -> dict[str, Any]:
         "command": report.command,
         "file": report.name,
         "dimension": mesh.dimension,
+        "surface": mesh.surface is not None,
         "vertices": int(mesh.topology.used.sum()),
         "free_vertices": int(mesh.movable.sum()),
         "fixed": report.fixed,

@@ -185,8 +185,9 @@ def _sliding(report: Report) -> str:
         return ""
     counts, solid = (report.facts or {})["sliding"], report.mesh.points.shape[1] == 3
     words = {"lines": "along lines", "planes": "in planes", "curves": "along curves", "surfaces": "on surfaces"}
-    shown = (f"{n:,} {words[key]}" for key, n in counts.items() if solid or key in ("lines", "curves"))
-    return f" ({', '.join(shown)})"
+    there = {key: n for key, n in counts.items() if n or report.mesh.surface is None}
+    shown = (f"{n:,} {words[key]}" for key, n in there.items() if solid or key in ("lines", "curves"))
+    return f" ({', '.join(shown)})" if there else ""
 
 
 def quality_rows(report: Report) -> list[Row]:

@@ -57,9 +57,11 @@ def what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh
     return (f"positions rounded to the file's {kind} invert {inverted}{written}{way_out}",)
 
 
-def folded_at_first(outcome: Outcome) -> tuple[str, ...]:
-    """Say from what the shape of a surface was known that was folded and had no reference."""
+def folded_at_first(outcome: Outcome, referred: bool) -> tuple[str, ...]:
+    """Say from what the shape of a surface was known that was folded; `referred`: a reference was given."""
     surface = outcome.before.surface
+    if surface is not None and referred and not surface.has_reference:
+        return ("most vertices are far from where the reference has a surface: it is not used",)
     if surface is None or surface.has_reference or outcome.records[0].inverted == 0:
         return ()
     return ("the surface was folded: its shape is what its points tell; --reference names the mesh before",)

@@ -16,6 +16,7 @@ PASSES = 3  # section 4: three passes of smoothing
 MOST_PASSES = 1_000_000
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for plane and solid meshes
 SMOOTHING = "smoothing"
+FEATURE_ANGLE, MAX_DEVIATION = 40.0, 0.03  # degrees, and mean edge lengths: see `curved.Smooth`
 ROUNDS = 8  # of "best", at most, after the first
 TURNS, RATIO_SWEEPS = 4, 6  # of "best" where elements are not all simplices
 MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold

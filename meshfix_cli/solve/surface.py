@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -22,7 +23,7 @@ Steps = Iterator[tuple["Mesh", "SweepRecord"]]
 
 
 def surface_steps(
-    mesh: Mesh, untangle: Callable[[Mesh], Steps], smooth: Callable[[Mesh], Steps], threads: int
+    mesh: Mesh, untangle: Callable[[Mesh], Steps], smooth: Callable[[Mesh], Steps], reach: float, threads: int
 ) -> Steps:
     """Yield a surface and a record, as it came and after each sweep; see `untangle.steps`.
 
@@ -35,12 +36,14 @@ def surface_steps(
         As `surface.laid_out` gives it.
     untangle, smooth : callable
         Run the phases that untangle, and all of them.
+    reach : float
+        How far vertices may move, in model units: where that is not anywhere, all do so at once.
     threads : int
     """
     surface = mesh.surface
     assert surface is not None and surface.kept is not None
     inverted = mesh.check(threads)[0]
-    if surface.has_reference or inverted == 0:
+    if surface.has_reference or inverted == 0 or reach < math.inf:
         yield from smooth(mesh)
         return
     best, first = mesh, True
@@ -51,22 +54,22 @@ def surface_steps(
             if first or record.phase != "input":
                 yield _as_before(moved, mesh), record
             first = False
-        now = _laid_on_sample(moved, flat, mesh, threads)
+        now = _laid_on_sample(moved, flat, mesh, region, threads)
         left = now.check(threads)[0]
         if left >= inverted:
             break
         best, inverted = now, left
+        region |= tangled(best, threads)
         if left == 0:
             break
-        region |= tangled(best, threads)
-    if inverted == 0 and (odd := feigned(best, region)).any():
-        yield from (found := _Last(smooth(_only(in_planes(best, region, threads), odd))))
-        best = _laid_on_sample(found.mesh, best, mesh, threads)
-    free = -1
-    while int(best.movable.sum()) > free:
-        free = int(best.movable.sum())
+    for _ in range(ROUNDS):
+        if inverted == 0 and (odd := feigned(best, region)).any():
+            yield from (found := _Last(smooth(_only(in_planes(best, region, threads), odd))))
+            best = _laid_on_sample(found.mesh, best, mesh, region, threads)
         yield from (found := _Last(smooth(best)))
-        best = laid_out(seen(found.mesh, threads), surface.kept, threads=threads)
+        best = laid_out(seen(found.mesh, threads), surface.kept, threads=threads, region=region)
+        if inverted or not feigned(best, region).any():
+            return
 
 
 class _Last:
@@ -94,7 +97,7 @@ def _as_before(moved: Mesh, mesh: Mesh) -> Mesh:
     return replace(moved, freedom=mesh.freedom, movable=mesh.movable)
 
 
-def _laid_on_sample(moved: Mesh, before: Mesh, first: Mesh, threads: int) -> Mesh:
+def _laid_on_sample(moved: Mesh, before: Mesh, first: Mesh, region: Mask, threads: int) -> Mesh:
     """Return a mesh of which the vertices that have moved are on the surface that all of them were on at first."""
     from meshfix_cli.solve.refit import refitted
 
@@ -102,4 +105,4 @@ def _laid_on_sample(moved: Mesh, before: Mesh, first: Mesh, threads: int) -> Mes
     there, here, sample = (one.along_curve(one.points) for one in (moved, before, first))
     rows = np.flatnonzero((there != here).any(axis=1))
     there = refitted(there, rows, normals_of_vertices(moved, threads), sample, normals_of_vertices(first, threads))
-    return laid_out(seen(moved.with_vertices(there), threads), first.surface.kept, threads=threads)
+    return laid_out(seen(moved.with_vertices(there), threads), first.surface.kept, threads=threads, region=region)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Iterator
+from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,17 @@ from meshfix_cli.mesh.reference import reference_points
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.solve.records import Outcome, SweepRecord
 from meshfix_cli.solve.run import Run
-from meshfix_cli.solve.strategies import SMOOTH, SMOOTHING, SWEEPS, THRESHOLD, Phase, Smooth, plan
+from meshfix_cli.solve.strategies import (
+    FEATURE_ANGLE,
+    MAX_DEVIATION,
+    SMOOTH,
+    SMOOTHING,
+    SWEEPS,
+    THRESHOLD,
+    Phase,
+    Smooth,
+    plan,
+)
 from meshfix_cli.solve.team import Alone
 
 if TYPE_CHECKING:
@@ -167,7 +178,8 @@ def untangle(
     sweeps, threshold, max_move, only_invalid
         See `steps`.
     reference : Mesh, optional
-        The same mesh before its boundary moved: elements should have the shapes that they have in it.
+        The same mesh before its boundary moved: elements should have the shapes that they have in it. Of a surface: on
+        which the vertices slide.
     threads : int
         The result has the same bits for any number.
 
@@ -191,8 +203,23 @@ def untangle(
     better one is kept. Both are first tried near the inverted elements, where these are few; FF follows, first in the
     smallest region that can be solved.
     """
-    phases = plan(strategy, smooth, only_invalid, reference is not None)
     places = None if reference is None else reference_points(mesh, reference, threads)
+    if mesh.surface is not None:
+        from meshfix_cli.mesh import curved
+        from meshfix_cli.mesh.surface import laid_by_default
+        from meshfix_cli.solve.surface import surface_steps
+
+        def sweeping(smooth: Smooth, surface: Mesh) -> Iterator[tuple[Mesh, SweepRecord]]:
+            return steps(
+                surface, plan(strategy, smooth, only_invalid), sweeps=sweeps, threshold=threshold, max_move=max_move,
+                only_invalid=only_invalid, threads=threads,
+            )  # fmt: skip
+
+        shape = curved.Smooth(FEATURE_ANGLE, MAX_DEVIATION * mesh.mean_edge_length(threads))
+        laid = laid_by_default(mesh, shape, places, threads)
+        found = drain(surface_steps(laid, partial(sweeping, 0), partial(sweeping, smooth), max_move, threads))
+        return Outcome(*found, find_obstacles(found[2], threads))
+    phases = plan(strategy, smooth, only_invalid, reference is not None)
     obstacles = find_obstacles(mesh, threads)
     run = steps(
         mesh, phases, sweeps=sweeps, threshold=threshold, max_move=max_move, only_invalid=only_invalid,

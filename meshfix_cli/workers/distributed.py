@@ -126,7 +126,7 @@ class Root:
         """
         if self.comm.size > 1 and find_spec("pymetis") is None:
             raise MeshfixError("pymetis is not installed: pip install 'meshfix-cli[mpi]'")
-        if mesh.quadratic is not None:  # the others have nothing to do: what is curved is little
+        if mesh.quadratic is not None or mesh.surface is not None:  # the others have nothing to do: these are little
             return self.method.solve(mesh, reach, self.threads, self.watch, reference)
         self._order("solve")
         own, self.owned, obstacles = None, [], find_obstacles(mesh, self.threads)

@@ -122,12 +122,13 @@ def test_a_plane_that_float32_bends_is_a_plane(tmp_path: Path, plate: Mesh) -> N
     assert read(tmp_path / "in.vtk").mesh.check()[0] == 0
 
 
-def test_curved_surface_is_refused(tmp_path: Path, plate: Mesh) -> None:
+def test_a_curved_surface_is_no_plane_mesh(tmp_path: Path, plate: Mesh) -> None:
     points = np.column_stack([plate.points, 0.1 * np.sin(plate.points[:, 0])])
     path = tmp_path / "curved.vtk"
     meshio.Mesh(points, [("triangle", plate.topology.simplices)]).write(path)
-    with pytest.raises(ReadError, match="curved surface"):
-        read(path)
+    document = read(path)
+    assert document.basis is None and document.mesh.surface is not None
+    np.testing.assert_array_equal(document.mesh.points, points)
 
 
 def test_cells_of_lower_dimension_hold_their_vertices(tmp_path: Path, bracket: Mesh) -> None:

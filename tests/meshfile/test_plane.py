@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from meshfix_cli import read
-from meshfix_cli.errors import MeshfixError, ReadError
+from meshfix_cli.errors import MeshfixError
 from meshfix_cli.meshfile.plane import plane_basis
 
 
@@ -34,8 +34,7 @@ def test_what_is_not_flat_is_not_hidden_by_a_vertex_far_away(far: float, random:
         points, normal = in_space(random)
         points[7] += far * (points[8] - points[9] if bent else normal)
         points[11] += 0.1 * normal * bent
-        with pytest.raises(ReadError, match="curved surface"):
-            plane_basis(points)
+        assert plane_basis(points) is None
 
 
 def test_a_plane_along_the_axes_has_their_bits(random: np.random.Generator) -> None:

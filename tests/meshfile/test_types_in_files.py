@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from written import SOLIDS, TEXT_4, Made, by_gmsh, by_vtk, surface_by_vtk
 
 from meshfix_cli import read, write
-from meshfix_cli.errors import ReadError, WriteError
+from meshfix_cli.errors import WriteError
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.writing import write_cells
@@ -190,12 +190,12 @@ def test_concave_quadrilaterals_of_drawings_are_named(tmp_path: Path) -> None:
     assert "1 quadrilateral is concave, and a concave one is inverted" in document.notes
 
 
-def test_quadrilaterals_of_a_curved_surface_are_refused(tmp_path: Path) -> None:
+def test_quadrilaterals_of_a_curved_surface_are_read(tmp_path: Path) -> None:
     points, cells = made("graded quads")
     bent = points + np.outer(np.sin(points[:, 0]), [0, 0, 1])
     by_vtk(tmp_path / "in.vtk", bent, cells)
-    with pytest.raises(ReadError, match="the elements form a curved surface; only plane meshes, and solid elements"):
-        read(tmp_path / "in.vtk")
+    mesh = read(tmp_path / "in.vtk").mesh
+    assert mesh.surface is not None and mesh.check()[0] == 0
 
 
 def test_facets_of_the_file_hold_their_vertices(tmp_path: Path) -> None:

@@ -346,7 +346,7 @@ auto nearest_py(const Reference& self, const Matrix<const double>& points, const
                        [&](std::int64_t begin, std::int64_t end, std::int64_t) {
                            for (std::int64_t i = begin; i < end; ++i) {
                                const Foot<D> foot = self.foot<D>(shapes.data()[i], load<D>(points.data() + i * D),
-                                                                    near == nullptr ? Reference::ANY : near[i]);
+                                                                    near == nullptr ? Reference::ANY : near[i], true);
                                const Vec<D> x = self.rounded<D>(shapes.data()[i], foot);
                                std::copy(x.begin(), x.end(), there.begin() + i * D);
                                distances[i] = std::sqrt(foot.distance2);

@@ -80,14 +80,14 @@ class Reference {
     int directions(std::int32_t shape) const { return directions_[shape]; }
 
     // `near`: a piece of the shape from which the search begins, or `ANY`; of pieces that are equally near the first is taken.
-    // Where searches walk, and come to a place in a piece that is nearer than this is large, that is it: what slides never
-    // jumps to where the shape comes near to itself.
+    // Where searches walk, and come to a place in a piece that is nearer than this is large, that is it, unless the nearest
+    // is wanted: what slides never jumps to where the shape comes near to itself.
     template <int D>
-    Foot<D> foot(std::int32_t shape, const Vec<D>& p, std::int64_t near = ANY) const {
+    Foot<D> foot(std::int32_t shape, const Vec<D>& p, std::int64_t near = ANY, bool nearest = false) const {
         Foot<D> best = any_foot<D>(shape);
         if (near != ANY) {
             const bool inside = walk<D>(shape, static_cast<std::int32_t>(near), p, best, -1.0);
-            if (inside && best.distance2 <= size2<D>(best.piece)) return best;
+            if (inside && !nearest && best.distance2 <= size2<D>(best.piece)) return best;
         }
         search<D>(shape, p, best, 0.0);
         return best;

@@ -1,0 +1,77 @@
+"""Surfaces: smoothed on themselves, and untangled along a reference or by what their points tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from surfaces import box, bumps, height, laid, off_torus, tangled, torus
+
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.quality.summary import change_of_shape, summarise
+from meshfix_cli.solve.untangle import untangle
+
+
+def test_smoothing_keeps_to_the_surface_and_raises_the_angles() -> None:
+    points, rows = torus(jitter=0.3)
+    mesh = laid(points, rows)
+    for smooth, least in (("auto", 20), ("best", 22)):
+        outcome = untangle(mesh, smooth=smooth)
+        before, after = summarise(mesh), summarise(outcome.after)
+        assert outcome.valid and after.min_angle > max(least, before.min_angle)
+        assert after.mean_min_angle > before.mean_min_angle
+        shape = change_of_shape(mesh, outcome.after)
+        assert shape["deviation"] <= shape["bound"] * 1.001 and abs(shape["size"]) < 0.01
+        # Phong's surface is nearer to the torus than the triangles are: the sag of a chord is h^2 / 8r.
+        h = mesh.mean_edge_length()
+        assert off_torus(outcome.after.points).max() < 0.25 * h**2 / (8 * 0.8)
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("body", ["torus", "quads", "bumps", "box"])
+def test_what_is_tangled_along_a_surface_is_untangled_with_a_reference(body: str, seed: int) -> None:
+    points, rows = {"torus": torus, "quads": lambda: torus(quads=True), "bumps": bumps, "box": box}[body]()
+    mesh = laid(tangled(points, rows, seed), rows, reference=points)
+    assert mesh.check()[0] > len(rows) / 20
+    outcome = untangle(mesh)
+    assert outcome.valid and summarise(outcome.after).folded == 0
+    fixed = ~mesh.movable
+    np.testing.assert_array_equal(outcome.after.points[fixed], mesh.points[fixed])
+    if body == "box":
+        on_sides = ((points == 0) | (points == 6)).any(axis=1)
+        kept = (points == 0) | (points == 6)
+        assert on_sides.all() and (outcome.after.points[kept] == points[kept]).all()
+
+
+@pytest.mark.parametrize("body", ["torus", "bumps"])
+def test_without_a_reference_the_points_tell_the_surface(body: str) -> None:
+    points, rows = {"torus": torus, "bumps": bumps}[body]()
+    folded = tangled(points, rows)
+    outcome = untangle(Mesh.build(folded, rows))
+    after = outcome.after.points
+    far = off_torus(after) if body == "torus" else np.abs(after[:, 2] - height(*after[:, :2].T))
+    # All vertices were on the surface; the triangles of their own are as far away.
+    h = outcome.after.mean_edge_length()
+    assert outcome.records[0].inverted > 50 and outcome.valid and far.max() < 0.1 * h
+    assert summarise(outcome.after).folded == 0
+
+
+def test_threads_give_the_same_bits() -> None:
+    points, rows = torus(72, 40)
+    one, other = (untangle(laid(points, rows), smooth="best", threads=threads).after.points for threads in (1, 3))
+    assert one.tobytes() == other.tobytes() and one.tobytes() != points.tobytes()
+
+
+def test_a_surface_far_away_and_small_is_solved_as_well() -> None:
+    points, rows = torus(24, 12)
+    straight = untangle(laid(points, rows), smooth=10).after.points
+    moved = untangle(laid(1e-3 * points + [7.0, -3.0, 5.0], rows), smooth=10).after.points
+    np.testing.assert_allclose((moved - [7.0, -3.0, 5.0]) * 1e3, straight, atol=1e-6)
+
+
+def test_max_move_holds() -> None:
+    points, rows = torus(jitter=0.4)
+    mesh = laid(points, rows)
+    reach = 0.1 * mesh.mean_edge_length()
+    outcome = untangle(mesh, max_move=reach)
+    far = np.linalg.norm(outcome.after.points - points, axis=1)
+    assert 0 < far.max() <= reach

@@ -171,7 +171,7 @@ def laid_out(
         return laid_out(mesh, kept, None, threads, region)
     if region is not None:
         found = replace(mesh, freedom=freedom, surface=Surface(normals, kept))
-        traces = np.append(feigned(found, region), False)[facets].any(axis=1)
+        traces = np.asarray(np.append(feigned(found, region), False)[facets].any(axis=1))
         smoothed = np.where(traces[:, None], _seen_around(mesh, threads)[1], normals)
         freedom = freedom_of(points, replace(given, normals=smoothed), kept.smooth) if traces.any() else freedom
     degrees = freedom.degrees

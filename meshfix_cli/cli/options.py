@@ -16,7 +16,7 @@ from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
 from meshfix_cli.repair import CURVINGS, MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.strategies import MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
+from meshfix_cli.solve.strategies import FEATURE_ANGLE, MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
@@ -244,7 +244,11 @@ reporting = packed(
 )
 _STORE = (
     click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
-    click.option("--fix-orientation", is_flag=True, help="Renumber elements whose numbering makes them negative."),
+    click.option(
+        "--fix-orientation",
+        is_flag=True,
+        help="Renumber elements whose numbering makes them negative; turn surfaces outwards.",
+    ),
     click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
 )
 storing = packed("files", Files, *_STORE)
@@ -263,17 +267,18 @@ _SLIDE = (
         type=click.Choice(SLIDES),
         default="none",
         show_default=True,
-        help="Let vertices of the boundary move where that does not change its shape. flat: in planes and on straight "
+        help="Let vertices of the boundary, or at the edges of a surface, move where that does not change the shape. "
+        "flat: in planes and on straight "
         "edges; corners and what is curved stay. curved: on smooth surfaces and along their edges as well, which "
         "changes the shape a little.",
     ),
     click.option(
         "--feature-angle",
         type=_Range(0, 180),
-        default=40.0,
+        default=FEATURE_ANGLE,
         show_default=True,
         metavar="DEGREES",
-        help="With --slide curved: facets that meet at a larger angle meet at an edge that stays.",
+        help="With --slide curved, and on surfaces: facets that meet at a larger angle meet at an edge that stays.",
     ),
 )
 solving = packed(
@@ -315,8 +320,8 @@ solving = packed(
         type=LENGTH,
         default=str(MAX_DEVIATION),
         show_default=True,
-        help="With --slide curved: no step takes the middles of edges and facets farther from the shape. h: a mean "
-        "edge of the boundary.",
+        help="With --slide curved, and on surfaces: no step takes the middles of edges and facets farther from the "
+        "shape. h: a mean edge of the boundary, or of the surface.",
     ),
     click.option(
         "--slide-interfaces/--no-slide-interfaces",

@@ -39,7 +39,8 @@ if TYPE_CHECKING:
     "--reference",
     type=FILE,
     metavar="FILE",
-    help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in it.",
+    help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in it. "
+    "Of a surface: that on which its vertices move.",
 )
 @click.option("--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells

@@ -191,6 +191,12 @@ class Method:
         mesh = document.mesh if reference is None else document.mesh.with_vertices(reference)
         return Smooth(self.feature_angle, self.max_deviation.on_boundary(mesh))
 
+    def without_effect(self, mesh: Mesh) -> tuple[str, ...]:
+        """Say what of it means nothing for a mesh."""
+        if self.slide == "none" or mesh.quadratic is None:
+            return ()
+        return (f"--slide {self.slide} has no effect: the boundary of curved elements does not slide",)
+
     def reach(self, mesh: Mesh, threads: int) -> float:
         """Return how far vertices may move, in model units."""
         return math.inf if self.max_move is None else self.max_move.length(mesh, threads)
@@ -454,6 +460,8 @@ def _solved(
 
     What counts is what the file will hold: boundaries of few digits may have been smoothed away from what these allow.
     """
+    if document.mesh.quadratic is not None:
+        return document, solve(document.mesh, reach), method.without_effect(document.mesh)
     freed = method.freed(document, reference)
     outcome = solve(freed.mesh, reach)
     notes: tuple[str, ...] = ()

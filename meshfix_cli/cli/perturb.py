@@ -52,6 +52,7 @@ def perturb(
     result, notes = files.write(document, perturbed, output)
     facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}
     stages = {"before": document.mesh, "perturbed": result}
+    notes = (*method.without_effect(document.mesh), *notes)
     report = show.judge(draw).report("perturb", document, stages, notes, facts=facts)
     draw.write(report, show.threads)
     show.print(report, report_stream(files))

@@ -106,6 +106,21 @@ def test_perturbed_and_mended(tmp_path: Path) -> None:
     run("untangle", tmp_path / "bad.vtu", tmp_path / "good.vtu")
 
 
+def test_what_does_not_slide_is_told(tmp_path: Path) -> None:
+    source = box(tmp_path / "in.vtu")
+    told = "--slide {} has no effect: the boundary of curved elements does not slide"
+    for slide in ("flat", "curved"):
+        found = report("untangle", "--allow-inverted", "--slide", slide, source, tmp_path / f"{slide}.vtu")
+        assert told.format(slide) in found["notes"]  # type: ignore[operator]
+    run("untangle", source, tmp_path / "none.vtu")
+    assert (tmp_path / "none.vtu").read_bytes() == (tmp_path / "flat.vtu").read_bytes()
+    assert not any("--slide" in note for note in report("untangle", source, tmp_path / "none.vtu")["notes"])  # type: ignore[attr-defined]
+    for words, slide in ((["--boundary"], "flat"), (["--slide", "curved"], "curved")):
+        tangle = ["perturb", "--percent", "10", "--dist", "0.1h", *words]
+        found = report(*tangle, source, tmp_path / "moved.vtu")
+        assert told.format(slide) in found["notes"]  # type: ignore[operator]
+
+
 def test_names_are_held_and_types_that_are_not_judged_are_named(tmp_path: Path) -> None:
     source = box(tmp_path / "in.vtu")
     mesh = meshio.read(source)

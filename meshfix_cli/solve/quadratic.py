@@ -333,13 +333,12 @@ def giving_way(mesh: Mesh, start: Array, max_move: float, threads: int) -> tuple
 
 
 def _is_tangled(mesh: Mesh, threads: int) -> bool:
-    """Whether a straight element is inverted that is invalid as it is curved as well, and has a free corner."""
-    quadratic, rows = mesh.quadratic, mesh.topology.connectivity.rows
-    assert quadratic is not None
-    wrong = np.zeros(mesh.topology.m, dtype=bool)
-    wrong[rows[mesh.judged().check(mesh.along_curve(mesh.points), threads)[0]]] = True
-    wrong[rows[mesh.stuck(threads)]] = False
-    return bool(wrong[quadratic.rows[quadratic.judge(mesh.points, threads).verdicts != VALID]].any())
+    """Whether a straight element with a free corner is inverted, and so is what it stands for where that is curved."""
+    rows = mesh.topology.connectivity.rows
+    straight = np.zeros(mesh.topology.m, dtype=bool)
+    straight[rows[mesh.judged().check(mesh.along_curve(mesh.points), threads)[0]]] = True
+    straight[rows[mesh.stuck(threads)]] = False
+    return bool((straight & mesh.judge_curved(threads)[0]).any())
 
 
 def _limits(mesh: Mesh, start: Array, max_move: float, threads: int) -> Limits:

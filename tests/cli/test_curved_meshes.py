@@ -19,6 +19,8 @@ from refined import SERENDIPITY, refined
 from written import by_vtk
 
 from meshfix_cli import read
+from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.repair import Method
 
 POINTS, TETRA = grid(*[np.linspace(0, 1, 4)] * 3)
@@ -206,6 +208,33 @@ def test_nodes_alone_are_mended_by_nodes_alone(tmp_path: Path) -> None:
     assert report("quality", source, code=3)["inverted"]
     run("untangle", source, tmp_path / "out.vtu")
     assert not moved(source, tmp_path / "out.vtu")[: len(SQUARE)].any()
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("bend", [0.02, 0.4])
+def test_linear_elements_beside_curved_ones_are_untangled(tmp_path: Path, d: int, bend: float) -> None:
+    """Also where all that is curved is valid; nodes between both kinds stay in the middle of their edges."""
+    corners, simplices = grid(*[np.linspace(0, 1, 5)] * d)
+    kind, left = ("triangle", "tetra")[d - 2], corners[simplices].mean(axis=1)[:, 0] < 0.5
+    points, blocks = refined(corners, [(kind, simplices[left])], ON_TOP)
+    blocks.append((kind, simplices[~left]))
+    inside, random = ((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1), np.random.default_rng(2)
+    node = np.arange(len(points)) >= len(corners)
+    size = np.where(node, bend / 3, 0.5) * inside * ((points[:, 0] < 0.5 - 1e-9) == node) * (points[:, 0] != 0.5)
+    points = points + size[:, None] * random.uniform(-1, 1, points.shape)
+    points = np.column_stack([points, np.zeros((len(points), 3 - d))])
+    meshio.Mesh(points, blocks).write(tmp_path / "in.vtu")
+    mesh = read(tmp_path / "in.vtu").mesh
+    assert mesh.quadratic is not None
+    assert mesh.check()[0] > (mesh.quadratic.judge(mesh.points, 1).verdicts != VALID).sum()
+    run("untangle", tmp_path / "in.vtu", tmp_path / "out.vtu")
+    assert report("quality", tmp_path / "out.vtu")["valid"]
+    after, rows = meshio.read(tmp_path / "out.vtu").points, blocks[0][1]
+    ends = [np.flatnonzero(weights) for weights in ELEMENTS[blocks[0][0]].weights]
+    for place, (a, b) in enumerate(ends, d + 1):
+        between = np.isclose(points[rows[:, [a, b]], 0], 0.5).all(axis=1)
+        middles = after[rows[between][:, [a, b]]].mean(axis=1)
+        np.testing.assert_allclose(after[rows[between, place]], middles, atol=1e-12)
 
 
 def test_held_nodes_stay_where_corners_are_tangled(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.ties import Ties
 
 _CURVED = (
-    "elements are curved, and are judged so; angles and ceilings are those of straight ones, and curved facets may meet"
+    "elements are curved, and are judged so; angles and their ceilings are of straight ones, and curved facets may meet"
 )
 _CURVED_SURFACE = (
     "elements of second order are judged as the straight ones of their corners; those that are curved stay"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,11 +13,14 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality import corners, simplices
 from meshfix_cli.quality.metrics import METRICS
 
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.quadratic import Judgement
+
 Array = NDArray[np.float64]
 AT_ONCE = 16384  # elements: what is computed of so many stays in the caches, and takes little memory
 
 
-def evaluate(name: str, mesh: Mesh) -> Array:
+def evaluate(name: str, mesh: Mesh, threads: int = 1, judgement: Judgement | None = None) -> Array:
     """Return the values of a metric for all elements.
 
     Parameters
@@ -23,11 +28,16 @@ def evaluate(name: str, mesh: Mesh) -> Array:
     name : str
         A key of `METRICS`.
     mesh : Mesh
+    threads : int
+    judgement : Judgement, optional
+        Of its `quadratic` elements, where that is known.
 
     Returns
     -------
     (m,) float64
-        See `evaluate_at`; nan for elements of types that do not have it. Those of surfaces are seen in planes.
+        See `evaluate_at`; nan for elements of types that do not have the metric. The scaled Jacobians of elements that
+        may be curved are the smallest at their nodes, see `Judgement`; all else is of the straight ones. Those of
+        surfaces are seen in planes.
     """
     if mesh.surface is not None:
         mesh = mesh.unfolded()
@@ -38,6 +48,9 @@ def evaluate(name: str, mesh: Mesh) -> Array:
         for start in range(0, len(block.rows), AT_ONCE):
             some = slice(start, start + AT_ONCE)
             values[block.rows[some]] = evaluate_at(name, block.element, mesh.points[block.vertices[some]])
+    if mesh.quadratic is not None and name == "scaled_jacobian":
+        judgement = judgement or mesh.quadratic.judge(mesh.points, threads)
+        values[mesh.quadratic.rows] = judgement.scaled_jacobians
     return values
 
 
@@ -66,9 +79,9 @@ def evaluate_at(name: str, element: Element, nodes: Array) -> Array:
     return np.where(np.isnan(values), 0.0 if METRICS[name].worst == "min" else np.inf, values)
 
 
-def worst_and_mean(name: str, mesh: Mesh) -> tuple[float, float]:
+def worst_and_mean(name: str, mesh: Mesh, threads: int = 1, judgement: Judgement | None = None) -> tuple[float, float]:
     """Return the worst and the mean value of a metric among the elements that have it; nan, where none has."""
-    values = evaluate(name, mesh)
+    values = evaluate(name, mesh, threads, judgement)
     values = values[~np.isnan(values)]
     if not len(values):
         return np.nan, np.nan

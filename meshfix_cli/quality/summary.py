@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import Block, Topology
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.quadratic import Judgement
 
 Array = NDArray[np.float64]
 BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
@@ -94,8 +98,8 @@ class Summary:
     there are none of these; `jacobians` tells of the scaled Jacobians of all elements, of which `histogram` is then,
     and `kinds` of the elements by their types.
 
-    Where elements are curved, `inverted` and the smallest measure are those of the curved elements, of which `curved`
-    tells more, and all else that of the straight ones of their corners.
+    Where elements are curved, `inverted`, the smallest measure and scaled Jacobians are those of the curved elements,
+    of which `curved` tells more, and all else that of the straight ones of their corners.
     """
 
     elements: int
@@ -140,11 +144,20 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     """
     if mesh.surface is not None:
         return _summarise_surface(mesh, metrics, threads)
-    if mesh.quadratic is not None:
-        straight = summarise(replace(mesh, quadratic=None), metrics, threads, reference)
-        return _with_curved(straight, mesh, threads)
-    if not mesh.topology.simplicial:
-        return _summarise_elements(mesh, metrics, threads, reference)
+    curved = None if mesh.quadratic is None else mesh.judge_curved(threads)
+    judgement = None if curved is None else curved[2]
+    simplicial = mesh.topology.simplicial
+    summary = _summarise_simplices(mesh, threads) if simplicial else _summarise_elements(mesh, threads, judgement)
+    summary = replace(
+        summary,
+        metrics={name: worst_and_mean(name, mesh, threads, judgement) for name in metrics},
+        to_reference=None if reference is None else worst_and_mean_to(mesh, reference, threads),
+    )
+    return summary if curved is None else _with_curved(summary, *curved)
+
+
+def _summarise_simplices(mesh: Mesh, threads: int) -> Summary:
+    """Evaluate a mesh of simplices of one type."""
     connectivity, bins = mesh.topology.connectivity, BINS[mesh.dimension]
     smallest, histogram, total, inverted, folded, min_measure, largest = kernels.summarise(
         mesh.along_curve(mesh.points), connectivity, bins, math.radians(BIN_WIDTH), threads
@@ -159,9 +172,8 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         mean_min_angle=math.degrees(total / len(smallest)),
         percentile_1=math.degrees(_percentile(smallest, 1, histogram)),
         histogram=tuple(histogram.tolist()),
-        metrics={name: worst_and_mean(name, mesh) for name in metrics},
+        metrics={},
         inverted_elements=np.sort(connectivity.rows[inverted]),
-        to_reference=None if reference is None else worst_and_mean_to(mesh, reference, threads),
     )
 
 
@@ -176,9 +188,8 @@ def _summarise_surface(mesh: Mesh, metrics: Sequence[str], threads: int) -> Summ
     return replace(summary, folded=int((one != other).sum()))
 
 
-def _with_curved(straight: Summary, mesh: Mesh, threads: int) -> Summary:
-    """Return the summary of straight elements with the verdicts of the curved ones."""
-    wrong, least, found = mesh.judge_curved(threads)
+def _with_curved(straight: Summary, wrong: NDArray[np.bool_], least: float, found: Judgement) -> Summary:
+    """Return the summary of straight elements with the verdicts of the curved ones, see `Mesh.judge_curved`."""
     curved = Curved(
         count=len(found.verdicts),
         inverted=int((found.verdicts != VALID).sum()),
@@ -190,15 +201,17 @@ def _with_curved(straight: Summary, mesh: Mesh, threads: int) -> Summary:
     return replace(straight, inverted=len(inverted), inverted_elements=inverted, min_measure=least, curved=curved)
 
 
-def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, reference: Array | None) -> Summary:
+def _summarise_elements(mesh: Mesh, threads: int, judgement: Judgement | None) -> Summary:
     """Evaluate a mesh of other elements than simplices of one type."""
     topology, points = mesh.topology, mesh.along_curve(mesh.points)
     verdicts, measures, _ = mesh.judged().judge(points, threads)
-    jacobians = evaluate("scaled_jacobian", mesh)
+    jacobians = evaluate("scaled_jacobian", mesh, threads, judgement)
     angles = [_angles(block, mesh.points, threads) for block in topology.blocks]
     smallest, largest = (np.concatenate(part) for part in zip(*angles, strict=True))
     bins = np.clip((jacobians * JACOBIAN_BINS).astype(int), 0, JACOBIAN_BINS - 1)
     by_row = topology.of_rows(verdicts)
+    if mesh.quadratic is not None and judgement is not None:
+        by_row[mesh.quadratic.rows] = judgement.verdicts
     return Summary(
         elements=topology.m,
         inverted=int((verdicts != VALID).sum()),
@@ -209,9 +222,8 @@ def _summarise_elements(mesh: Mesh, metrics: Sequence[str], threads: int, refere
         mean_min_angle=math.degrees(smallest.mean()) if len(smallest) else math.nan,
         percentile_1=math.degrees(np.percentile(smallest, 1)) if len(smallest) else math.nan,
         histogram=tuple(np.bincount(bins, minlength=JACOBIAN_BINS).tolist()),
-        metrics={name: worst_and_mean(name, mesh) for name in metrics},
+        metrics={},
         inverted_elements=np.flatnonzero(by_row != VALID).astype(np.int32),
-        to_reference=None if reference is None else worst_and_mean_to(mesh, reference, threads),
         jacobians=Jacobians(float(jacobians.min()), float(jacobians.mean()), float(np.percentile(jacobians, 1))),
         kinds=tuple(_kind(block, by_row[block.rows], jacobians[block.rows]) for block in topology.blocks),
     )
@@ -256,12 +268,13 @@ def _percentile(angles: Array, percent: float, histogram: NDArray[np.int64]) -> 
 def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
     """Return arrays (m,): the signed measure in model units, the smallest angle in degrees, 1 where inverted.
 
-    Where elements are not all simplices, the scaled Jacobian takes the place of the angle. Where some are curved, there
-    is the smallest coefficient of the Jacobian determinant as well, see `Curved`; NaN for others.
+    Where elements are not all simplices, the scaled Jacobian takes the place of the angle. Where some are curved, it is
+    there as well, and so is the smallest coefficient of the Jacobian determinant, see `Curved`; NaN for others.
     """
     judged = mesh.judged().judge(mesh.along_curve(mesh.points), threads)
     verdicts, measure, quality = (mesh.topology.of_rows(values) for values in judged)
     curved: dict[str, NDArray[np.generic]] = {}
+    found = None
     if mesh.quadratic is not None:
         found, rows = mesh.quadratic.judge(mesh.points, threads), mesh.quadratic.rows
         verdicts[rows], measure[rows] = found.verdicts, found.measures
@@ -269,7 +282,9 @@ def by_element(mesh: Mesh, threads: int = 1) -> dict[str, NDArray[np.generic]]:
         curved["smallest_coefficient"][rows] = found.smallest
     wrong = (verdicts != VALID) | mesh.topology.misnumbered
     simplicial = {"min_angle": np.degrees(quality)} if mesh.topology.simplicial else {}
-    other = {} if mesh.topology.simplicial else {"scaled_jacobian": evaluate("scaled_jacobian", mesh)}
+    other = {}
+    if found is not None or not mesh.topology.simplicial:
+        other["scaled_jacobian"] = evaluate("scaled_jacobian", mesh, threads, found)
     return {"measure": measure, **simplicial, **other, **curved, "inverted": wrong.astype(np.int32)}
 
 
@@ -287,7 +302,7 @@ def worst_first(mesh: Mesh, inverted: NDArray[np.int32], count: int, threads: in
         judged = mesh.judged()
         badness = -mesh.topology.of_rows(judged.angles(mesh.along_curve(mesh.points), threads))
     else:
-        badness = -evaluate("scaled_jacobian", mesh)
+        badness = -evaluate("scaled_jacobian", mesh, threads)
     if mesh.quadratic is not None:
         badness[mesh.quadratic.rows] = -np.minimum(mesh.quadratic.judge(mesh.points, threads).smallest, 1.0)
     badness[inverted] += 2 * math.pi
@@ -387,6 +402,13 @@ def _sizes(points: NDArray[np.float64], facets: NDArray[np.int32]) -> tuple[floa
     return abs(volume), area
 
 
+def _without_free_node(mesh: Mesh, rows: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Leave out of some elements without a free corner those that have a free node on their edges, faces or inside."""
+    if mesh.quadratic is None:
+        return rows
+    return np.setdiff1d(rows, mesh.quadratic.rows[mesh.quadratic.with_one(mesh.quadratic.free)])
+
+
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     """Find what no method can raise: the smallest quality among the elements that have no free vertex.
 
@@ -405,6 +427,7 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     if len(stuck) == 0:
         return None
     if not mesh.topology.simplicial:
-        return float(evaluate("scaled_jacobian", mesh)[mesh.topology.connectivity.rows[stuck]].min())
+        rows = _without_free_node(mesh, mesh.topology.connectivity.rows[stuck])
+        return float(evaluate("scaled_jacobian", mesh, threads)[rows].min()) if len(rows) else None
     judged = mesh.judged(stuck)
     return math.degrees(float(judged.angles(mesh.along_curve(mesh.points), threads).min()))

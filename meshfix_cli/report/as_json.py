@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 from meshfix_cli import __version__
 from meshfix_cli.mesh.elements import role
 from meshfix_cli.quality.metrics import NUMBERS, having
-from meshfix_cli.quality.summary import Kind, Summary
+from meshfix_cli.quality.summary import Kind, Summary, by_element
 from meshfix_cli.report.facts import Report, binned, first_inverted
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.solve.records import SweepRecord
 
+CURVED = ("smallest_coefficient", "scaled_jacobian")  # of elements that may be curved
 SCHEMA = 1  # raised when a name in the JSON changes its meaning or goes away
 
 
@@ -44,7 +45,7 @@ def to_json(report: Report) -> dict[str, Any]:
         **{name: _finite(getattr(result, name)) for name in NUMBERS},
         "ceiling": report.ceiling,
         "quality": {stage: _summary_json(summary, mesh) for stage, summary in report.stages.items()},
-        "first_inverted": [{"id": i, "centroid": c} for _, i, c in first_inverted(report)],
+        "first_inverted": list(_first_inverted(report)),
         "inverted_without_free_vertex": len(report.obstacles.inverted),
         "obstacles": {
             field.name: report.ids[getattr(report.obstacles, field.name)].tolist() for field in fields(report.obstacles)
@@ -58,6 +59,18 @@ def to_json(report: Report) -> dict[str, Any]:
         **({} if report.groups is None else {"groups": list(_groups_json(report.groups, mesh))}),
         **(report.facts or {}),
     }
+
+
+def _first_inverted(report: Report) -> Iterator[dict[str, Any]]:
+    """Give an object for each inverted element that is listed, with how good it is where it may be curved."""
+    listed = first_inverted(report)
+    more: list[dict[str, float]] = [{}] * len(listed)
+    if report.mesh.quadratic is not None and listed:
+        values = by_element(report.mesh)
+        numbers = (values[name][report.result.inverted_elements].tolist() for name in CURVED)
+        more = [dict(zip(CURVED, one, strict=True)) for one in zip(*numbers, strict=True)]
+    for (_, number, centroid), curved in zip(listed, more, strict=False):
+        yield {"id": number, "centroid": centroid, **{name: _finite(value) for name, value in curved.items()}}
 
 
 def _groups_json(groups: Mapping[str, Mapping[int, int]], mesh: Mesh) -> Iterator[dict[str, Any]]:

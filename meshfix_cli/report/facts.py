@@ -223,7 +223,7 @@ def is_some_inside(report: Report) -> bool:
 
 
 def _inside(summary: Summary) -> int:
-    return summary.curved.inside if summary.curved else sum(kind.inside for kind in summary.kinds)
+    return summary.curved.inside if summary.curved and not summary.kinds else sum(one.inside for one in summary.kinds)
 
 
 def _curved(row: Callable[..., Row]) -> Iterator[Row]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import curved_bodies
@@ -21,6 +22,7 @@ from written import by_vtk
 from meshfix_cli import read
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.repair import Method
 
 POINTS, TETRA = grid(*[np.linspace(0, 1, 4)] * 3)
@@ -139,6 +141,53 @@ def test_names_are_held_and_types_that_are_not_judged_are_named(tmp_path: Path) 
     by_vtk(tmp_path / "pyramid.vtu", points, blocks)
     line = error_line("quality", tmp_path / "pyramid.vtu")
     assert "1 of 1 element is curved (pyramids of 13 nodes)" in line
+
+
+@pytest.mark.parametrize("kind", ["tetra", "hexahedron"])
+def test_scaled_jacobians_are_those_of_the_curved_elements(tmp_path: Path, kind: str) -> None:
+    """In requirements, in files of cells and for programs, beside those of straight elements that are well."""
+    source, corners = tmp_path / "in.vtu", POINTS
+    rows = TETRA if kind == "tetra" else hexahedra(4)
+    points, blocks = refined(corners, [(kind, rows)], ON_TOP)
+    inside = np.asarray(((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1))
+    inside[: len(corners)] = False
+    points[inside] += np.random.default_rng(0).uniform(-0.1, 0.1, points[inside].shape)
+    meshio.Mesh(points, blocks).write(source)
+    found = report("quality", source, "--metric", "scaled_jacobian", "--metric", "shape", "--all", code=3)
+    mesh = read(source).mesh
+    assert mesh.quadratic is not None
+    judged = mesh.quadratic.judge(mesh.points, 1)
+    smallest, straight = judged.scaled_jacobians.min(), evaluate("scaled_jacobian", replace(mesh, quadratic=None))
+    assert smallest < straight.min() - 0.1
+    told = found["quality"]["mesh"]  # type: ignore[index]
+    assert told["metrics"]["scaled_jacobian"] == {
+        "worst": pytest.approx(smallest), "mean": pytest.approx(judged.scaled_jacobians.mean()),
+    }  # fmt: skip
+    if kind == "hexahedron":
+        assert told["scaled_jacobian"]["smallest"] == pytest.approx(smallest)
+    first = {one["id"]: one for one in found["first_inverted"]}  # type: ignore[attr-defined]
+    inverted = np.flatnonzero(judged.verdicts != VALID)
+    assert list(first) == inverted.tolist()
+    for row in inverted.tolist():
+        assert first[row]["scaled_jacobian"] == pytest.approx(judged.scaled_jacobians[row])
+        assert first[row]["smallest_coefficient"] == pytest.approx(judged.smallest[row])
+    run("quality", "--cells", tmp_path / "cells.vtu", source, code=3)
+    cells = meshio.read(tmp_path / "cells.vtu").cell_data["scaled_jacobian"][0]
+    np.testing.assert_allclose(cells, judged.scaled_jacobians)
+    target = tmp_path / "out.vtu"
+    run("untangle", source, target)
+    reached = read(target).mesh
+    assert reached.quadratic is not None
+    value = reached.quadratic.judge(reached.points, 1).scaled_jacobians.min()
+    for share, code in ((0.99, 0), (1.01, 3)):
+        run("quality", "--require", f"scaled_jacobian >= {share * value}", target, code=code)
+
+
+def hexahedra(n: int) -> NDArray[np.int32]:
+    """The hexahedra of a grid of n points along each axis."""
+    first = np.arange(n**3, dtype=np.int32).reshape(n, n, n)[:-1, :-1, :-1].ravel()
+    base = np.array([0, n * n, n * n + n, n], dtype=np.int32)
+    return np.column_stack([first[:, None] + base, first[:, None] + base + 1])
 
 
 SOME = (

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from monomials import CODES, Array, inside, jacobians, perturbed, positions
+from monomials import CODES, Array, derivatives, inside, jacobians, perturbed, positions
 from scipy.optimize import linprog
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.judged import CORNER, INSIDE, VALID
+from meshfix_cli.quality.formulas import evaluate_at
 
 COUNTS = {
     "triangle6": 6, "quad8": 16, "quad9": 16, "tetra10": 20, "wedge15": 90, "wedge18": 90, "hexahedron20": 216,
@@ -66,6 +67,35 @@ def test_measures_are_integrals(random: np.random.Generator, key: str) -> None:
     measure = mesh_of(key).judge(nodes, 1)[2][0]
     error = 6 * values.std() / np.sqrt(len(values)) * unit[ELEMENTS[key].shape.name]
     assert measure == pytest.approx(values.mean() * unit[ELEMENTS[key].shape.name], abs=error)
+
+
+@every
+def test_scaled_jacobians_are_of_the_worst_corner_at_each_node(random: np.random.Generator, key: str) -> None:
+    """A triangle or tetrahedron of derivatives has several corners: it is no matter with which the file begins."""
+    element, d = ELEMENTS[key], ELEMENTS[key].shape.dimension
+    for size in (0.0, 0.05, 0.3):
+        nodes = perturbed(random, key, size) @ (np.eye(d) + 0.2 * random.normal(size=(d, d)))
+        expected = []
+        for along in derivatives(key, nodes, positions(key)):
+            corners, line = [along], 1.0
+            if element.shape.name in ("triangle", "tetrahedron", "wedge"):
+                ends = np.concatenate([np.zeros((1, d)), along[: 2 if element.shape.name == "wedge" else d]])
+                corners = [np.delete(ends - end, i, axis=0) for i, end in enumerate(ends)]
+                line = float(np.linalg.norm(along[2])) if element.shape.name == "wedge" else 1.0
+            longest = line * max(np.linalg.norm(edges, axis=1).prod() for edges in corners)
+            expected.append(element.shape.weight * np.linalg.det(along) / longest)
+        assert mesh_of(key).judge(nodes, 1)[3][0] == pytest.approx(min(expected), abs=1e-12)
+
+
+@pytest.mark.parametrize("key", ["triangle6", "tetra10"])
+def test_scaled_jacobians_of_straight_simplices_are_verdicts(random: np.random.Generator, key: str) -> None:
+    corners = positions(key)[: ELEMENTS[key].shape.corners]
+    for _ in range(20):
+        nodes = corners + 0.2 * random.normal(size=corners.shape)
+        means = np.array([nodes[mean].mean(axis=0) for mean in kernels.QUADRATIC_SHAPES[CODES[key]][1]])
+        straight = ELEMENTS[{"triangle6": "triangle", "tetra10": "tetra"}[key]]
+        expected = evaluate_at("scaled_jacobian", straight, nodes[None])[0]
+        assert mesh_of(key).judge(means, 1)[3][0] == pytest.approx(expected, abs=1e-12)
 
 
 @every

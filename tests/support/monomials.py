@@ -57,6 +57,11 @@ def inside(random: np.random.Generator, key: str, count: int) -> Array:
 
 def jacobians(key: str, nodes: Array, at: Array) -> Array:
     """Return det J (k,) of an element with nodes (n, d) at parameters (k, d)."""
+    return np.asarray(np.linalg.det(derivatives(key, nodes, at)))
+
+
+def derivatives(key: str, nodes: Array, at: Array) -> Array:
+    """Return the derivatives (k, directions, d) of the position; see `jacobians`."""
     powers = exponents(key)
     basis = np.stack([np.prod(positions(key) ** np.array(e), axis=1) for e in powers], axis=1)
     weights = np.linalg.solve(basis, nodes)  # of the monomials
@@ -68,7 +73,7 @@ def jacobians(key: str, nodes: Array, at: Array) -> Array:
             lower[axis] = max(lower[axis] - 1, 0)
             slopes.append(e[axis] * np.prod(at**lower, axis=1))
         columns.append(np.stack(slopes, axis=1) @ weights)
-    return np.asarray(np.linalg.det(np.stack(columns, axis=1)))
+    return np.stack(columns, axis=1)
 
 
 def perturbed(random: np.random.Generator, key: str, size: float) -> Array:

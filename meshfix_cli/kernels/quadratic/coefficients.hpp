@@ -259,14 +259,34 @@ double straight_size(const QuadraticType& type, const QuadraticNodes<D>& nodes) 
     return std::max(sum / type.coefficients, span);
 }
 
+// What det J is divided by: the squared lengths of the derivatives along the edges of a corner, of that where these are longest.
+// At a corner of a triangle or tetrahedron, as in all of a straight one, no corner is more than another.
+template <int D>
+double longest_edges2(const QuadraticType& type, const Edges<D>& derivatives) {
+    double product2 = 1.0;
+    int first = 0;
+    for (const int n : type.factors) {
+        const auto towards = [&](int corner) { return corner == 0 ? Vec<D>{} : derivatives[first + corner - 1]; };
+        double most = 0.0;
+        for (int from = 0; from <= n; ++from) {
+            double lengths2 = 1.0;
+            for (int to = 0; to <= n; ++to)
+                if (to != from) lengths2 *= norm2(towards(to) - towards(from));
+            most = std::max(most, lengths2);
+        }
+        product2 *= most;
+        first += n;
+    }
+    return product2;
+}
+
 // The smallest scaled Jacobian at the nodes; 0 where a derivative is none.
 template <int D>
 double scaled_jacobian(const QuadraticParts<D>& parts) {
     double smallest = INFINITY;
     for (int node = 0; node < parts.type->nodes; ++node) {
         const Edges<D> e = parts.at_node(node);
-        double product2 = 1.0;
-        for (const auto& edge : e) product2 *= norm2(edge);
+        const double product2 = longest_edges2<D>(*parts.type, e);
         smallest = std::min(smallest, product2 > 0.0 ? determinant(e) / std::sqrt(product2) : 0.0);
     }
     return parts.type->weight * smallest;

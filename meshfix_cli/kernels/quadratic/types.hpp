@@ -76,6 +76,7 @@ class QuadraticType {
 
     int dimension, nodes, corners = 0, controls, coefficients, normals = 0;
     double weight, integral;
+    std::vector<int> factors;                    // their dimensions
     std::vector<Sum> control_of_nodes;          // each control point as a sum of nodes
     std::array<std::vector<Sum>, 3> difference;  // along each direction: sums of control points, scaled
     std::vector<std::vector<int>> between;
@@ -90,7 +91,7 @@ class QuadraticType {
 
     explicit QuadraticType(const QuadraticShape& shape)
         : dimension(shape.dimension), nodes(static_cast<int>(shape.between.size())), weight(shape.weight),
-          integral(shape.integral), between(shape.between), factors_(shape.factors) {
+          integral(shape.integral), factors(shape.factors), between(shape.between) {
         for (const auto& corner : between) corners += corner.size() == 1;
         find_controls();
         find_differences();
@@ -101,7 +102,6 @@ class QuadraticType {
     }
 
    private:
-    std::vector<int> factors_;
     std::map<Index, int> control_, coefficient_;
     std::array<std::vector<Index>, 3> difference_index_;
     std::vector<Index> corner_index_;
@@ -112,7 +112,7 @@ class QuadraticType {
     double multinomial(const Index& index) const {
         double product = 1.0;
         std::size_t at = 0;
-        for (const int n : factors_) {
+        for (const int n : factors) {
             int degree = 0;
             for (int i = 0; i <= n; ++i) {
                 degree += index[at + i];
@@ -127,7 +127,7 @@ class QuadraticType {
     // All indices of given degrees in the factors.
     std::vector<Index> indices(const std::vector<int>& degrees) const {
         std::vector<Index> found{{}};
-        for (std::size_t f = 0; f < factors_.size(); ++f) {
+        for (std::size_t f = 0; f < factors.size(); ++f) {
             std::vector<Index> more;
             for (const Index& index : found) {
                 const auto extend = [&](const auto& self, const Index& so_far, int places, int left) -> void {
@@ -140,7 +140,7 @@ class QuadraticType {
                             self(self, next, places - 1, left - e);
                     }
                 };
-                extend(extend, index, factors_[f] + 1, degrees[f]);
+                extend(extend, index, factors[f] + 1, degrees[f]);
             }
             found = std::move(more);
         }
@@ -168,8 +168,8 @@ class QuadraticType {
             return a;
         };
         std::vector<Index> found;
-        if (factors_.size() == 1 || factors_[0] == 2) {
-            for (int i = 0; i <= factors_[0]; ++i) found.push_back(unit(factors_[0] + 1, i));
+        if (factors.size() == 1 || factors[0] == 2) {
+            for (int i = 0; i <= factors[0]; ++i) found.push_back(unit(factors[0] + 1, i));
         } else {
             for (const auto& [x, y] : {std::array<int, 2>{0, 0}, {1, 0}, {1, 1}, {0, 1}})
                 found.push_back(joined(unit(2, x), unit(2, y)));
@@ -191,7 +191,7 @@ class QuadraticType {
 
     void find_controls() {
         find_corners();
-        for (const Index& index : indices(std::vector<int>(factors_.size(), 2))) control_.emplace(index, static_cast<int>(control_.size()));
+        for (const Index& index : indices(std::vector<int>(factors.size(), 2))) control_.emplace(index, static_cast<int>(control_.size()));
         controls = static_cast<int>(control_.size());
         std::map<Index, int> node_at;
         for (int i = 0; i < nodes; ++i) node_at[index_of(between[i])] = i;
@@ -228,7 +228,7 @@ class QuadraticType {
     Sum control_from(const Index& index, const std::map<Index, Sum>& position) const {
         std::vector<std::pair<Index, double>> terms{{index, 1.0}};
         std::size_t at = 0;
-        for (const int n : factors_) {
+        for (const int n : factors) {
             std::vector<std::pair<Index, double>> more;
             for (const auto& [where, share] : terms) {
                 std::vector<int> ends;
@@ -262,10 +262,10 @@ class QuadraticType {
     void find_differences() {
         std::size_t at = 0;
         int direction = 0;
-        for (std::size_t f = 0; f < factors_.size(); ++f) {
-            std::vector<int> degrees(factors_.size(), 2);
+        for (std::size_t f = 0; f < factors.size(); ++f) {
+            std::vector<int> degrees(factors.size(), 2);
             degrees[f] = 1;
-            for (int j = 1; j <= factors_[f]; ++j, ++direction) {
+            for (int j = 1; j <= factors[f]; ++j, ++direction) {
                 for (const Index& index : indices(degrees)) {
                     const double scale = 2.0 * multinomial(index);
                     const int first = static_cast<int>(at);
@@ -273,7 +273,7 @@ class QuadraticType {
                     difference_index_[direction].push_back(index);
                 }
             }
-            at += factors_[f] + 1;
+            at += factors[f] + 1;
         }
     }
 
@@ -352,7 +352,7 @@ class QuadraticType {
     // The half beside the first end of an edge: there the other end is the middle. Blossoms of degree 2.
     void find_halves() {
         std::size_t at = 0;
-        for (const int n : factors_) {
+        for (const int n : factors) {
             for (int a = 0; a <= n; ++a)
                 for (int b = a + 1; b <= n; ++b) {
                     const int one = static_cast<int>(at) + a, other = static_cast<int>(at) + b;

@@ -39,7 +39,10 @@ class QuadraticMesh:
         It visits those that have a coefficient below the goal; `tied`: nodes between go along with them.
         """
     def impossible(self, points: Float64, free: Uint8) -> Uint8:
-        """Mark elements (m,) that cannot be valid while fixed nodes stay: 1 by themselves, 2 together with others."""
+        """Mark elements (m,) that cannot be valid while fixed nodes stay: 1 by themselves, 2 together with others.
+
+        Only proofs that a node of an element is part of that is not valid now are found, see quadratic/proofs.hpp.
+        """
 
 class QuadraticEnergy:
     """Minimises the energy of quadratic/energy.hpp over the free nodes, for one goal after the other."""

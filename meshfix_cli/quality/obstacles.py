@@ -120,15 +120,16 @@ def _of_surface(mesh: Mesh, threads: int) -> Obstacles:
 
 
 def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
-    """Return what is proved at corners of curved elements, and where straight ones meet: of others that is not known.
+    """Return what is proved of curved elements, and where straight ones meet: of others that is not known.
 
-    Inverted are those whose determinant at a corner no free node changes; they exclude each other where all have a free
-    edge in common, and no tangent of it makes them valid at its end.
+    Inverted are those that are so wherever free nodes go; they exclude each other where one free node, or one free edge
+    at an end of it, is common to them, and no position or tangent of it makes all of them valid.
     """
     free = mesh.movable | quadratic.free
     proofs = quadratic.kernel.impossible(mesh.points, free.astype(np.uint8))
-    alone, together = (np.sort(quadratic.rows[proofs == mark]).astype(np.int32) for mark in (1, 2))
     straight = find_obstacles(replace(mesh, quadratic=None), threads)
+    alone, together = quadratic.rows[proofs == 1], np.sort(quadratic.rows[proofs == 2]).astype(np.int32)
+    alone = np.union1d(alone, np.setdiff1d(straight.inverted, quadratic.rows)).astype(np.int32)
     bent = np.zeros(mesh.topology.m, dtype=bool)
     bent[quadratic.rows] = quadratic.bent(mesh.points)
     crossing, folding = (pairs[~bent[pairs].any(axis=1)] for pairs in (straight.crossing, straight.folding))

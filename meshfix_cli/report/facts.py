@@ -338,16 +338,16 @@ def verdict(report: Report, listing: bool = True) -> list[str]:
 
 def _impossible(report: Report) -> Iterator[str]:
     """Name what no motion of the free vertices can mend."""
-    found = report.obstacles
+    found, curved = report.obstacles, report.mesh.quadratic is not None
     if count := len(found.inverted):
-        which = _some(report, found.inverted)
-        where = "without" if report.mesh.topology.simplicial else "at corners without"
-        where = "at corners without" if report.mesh.quadratic is not None else where
-        yield f"IMPOSSIBLE: {count:,} of them {where} a free vertex: the fixed ones are wrong ({which})"
+        where = "without a free vertex" if report.mesh.topology.simplicial else "at corners without a free vertex"
+        where = "wherever free nodes go" if curved else where
+        yield f"IMPOSSIBLE: {count:,} of them {where}: the fixed ones are wrong ({_some(report, found.inverted)})"
     if count := len(found.exclusive):  # at least two
+        shared = "free nodes that they share go" if curved else "free vertex that they share goes"
         yield (
-            f"IMPOSSIBLE: {count:,} elements exclude each other: wherever the free vertex that they share goes, one of "
-            f"them is inverted ({_some(report, found.exclusive)})"
+            f"IMPOSSIBLE: {count:,} elements exclude each other: wherever the {shared}, one of them is inverted "
+            f"({_some(report, found.exclusive)})"
         )
     for pairs, what in ((found.crossing, "crosses itself"), (found.folding, "folds back upon itself")):
         if count := len(pairs):

@@ -203,7 +203,7 @@ SOME = (
 
 
 def test_meshes_around_round_things_become_valid_or_that_is_impossible(tmp_path: Path) -> None:
-    """What is left is valid where the boundary gives way a little."""
+    """Each element that is left is named, and is valid where the boundary gives way a little."""
     seen = []
     with gmsh_session() as gmsh:
         for name in curved_bodies.made(gmsh, SOME):
@@ -216,6 +216,8 @@ def test_meshes_around_round_things_become_valid_or_that_is_impossible(tmp_path:
             seen.append((name, outcome.records[0].inverted, outcome.records[-1].inverted))
             assert outcome.records[-1].inverted <= outcome.records[0].inverted, name
             if not outcome.valid:
+                left = mesh.quadratic.rows[mesh.quadratic.judge(outcome.after.points, 1).verdicts != VALID]
+                assert np.isin(left, [*outcome.obstacles.inverted, *outcome.obstacles.exclusive]).all(), name
                 relaxed = Method(curving="relax").solve(mesh, float("inf"), 1)
                 assert relaxed.valid, name
                 moved = np.linalg.norm(relaxed.after.points - mesh.points, axis=1)[~mesh.quadratic.free & ~mesh.movable]
@@ -284,6 +286,32 @@ def test_linear_elements_beside_curved_ones_are_untangled(tmp_path: Path, d: int
         between = np.isclose(points[rows[:, [a, b]], 0], 0.5).all(axis=1)
         middles = after[rows[between][:, [a, b]]].mean(axis=1)
         np.testing.assert_allclose(after[rows[between, place]], middles, atol=1e-12)
+
+
+def test_what_fixed_nodes_make_impossible_is_named(tmp_path: Path) -> None:
+    """A curved element at one corner of a square, without a free node there, and a linear one at another."""
+    source = plate(tmp_path / "in.vtu", kinds=("triangle6", "triangle"))
+    mesh = meshio.read(source)
+    curved, linear = (cells.data for cells in mesh.cells)
+    outside, expected = ((SQUARE == 0) | (SQUARE == 1)).all(axis=1), []
+    for row, nodes in enumerate([*curved, *linear]):
+        (alone,) = [v for v in nodes[:3] if outside[v] and (v == TRIANGLES).sum() == 1] or [None]
+        if alone is None:
+            continue
+        expected.append(row)
+        if row < len(curved):  # its edges turn past each other
+            place = int(np.flatnonzero(nodes == alone)[0])
+            ends = nodes[[3 + place, 3 + (place + 2) % 3]]
+            mesh.points[ends] += 1.2 * (mesh.points[ends] - mesh.points[alone])[::-1]
+        else:
+            mesh.points[alone] += 1.1 * (mesh.points[nodes].sum(axis=0) - 3 * mesh.points[alone])
+    assert len(expected) == 2
+    mesh.write(source)
+    found = report("quality", source, code=3)
+    assert found["obstacles"]["inverted"] == expected  # type: ignore[index]
+    which = ", ".join(map(str, expected))
+    named = f"IMPOSSIBLE: 2 of them wherever free nodes go: the fixed ones are wrong (elements {which})"
+    assert named in " ".join(run("quality", source, code=3).stdout.decode().split())
 
 
 def test_held_nodes_stay_where_corners_are_tangled(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from monomials import CODES, Array, derivatives, inside, jacobians, perturbed, positions
+from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from meshfix_cli import kernels
@@ -251,8 +252,76 @@ def test_what_no_free_node_changes_is_proved() -> None:
     assert mesh_of("triangle6").impossible(positions("triangle6"), free).tolist() == [0]
 
 
-def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.random.Generator) -> None:
-    """Tetrahedra around one edge whose middle alone is free: proved where HiGHS finds no tangent either."""
+def lattice(key: str, steps: int = 4) -> Array:
+    """Return the parameters of places in a type, its nodes among them."""
+    d, name = ELEMENTS[key].shape.dimension, ELEMENTS[key].shape.name
+    at = np.stack(np.meshgrid(*[np.arange(steps + 1)] * d, indexing="ij"), axis=-1).reshape(-1, d)
+    simplex = {"triangle": 2, "wedge": 2, "tetrahedron": 3}.get(name, 0)
+    return at[at[:, :simplex].sum(axis=1) <= steps] / steps
+
+
+def dependence(random: np.random.Generator, key: str, at: Array) -> NDArray[np.bool_]:
+    """Return on which nodes (k, nodes) det J depends at parameters."""
+    nodes = perturbed(random, key, 0.1)
+    found = np.empty((len(at), len(nodes)), dtype=bool)
+    for node in range(len(nodes)):
+        moved = nodes.copy()
+        moved[node] += random.normal(size=nodes.shape[1])
+        found[:, node] = np.abs(jacobians(key, moved, at) - jacobians(key, nodes, at)) > 1e-9
+    return found
+
+
+def optimum(key: str, points: Array, rows: list[list[int]], node: int, at: list[Array]) -> float:
+    """Return the largest smallest det J of elements at parameters `at` of each, wherever one node goes; at most 1."""
+    columns, values = [], []
+    for row, places in zip(rows, at, strict=True):
+        here, place = points[row], row.index(node)
+        values.append(jacobians(key, here, places))
+        columns.append([jacobians(key, here + np.outer(np.arange(len(row)) == place, step), places) - values[-1]
+                        for step in np.eye(points.shape[1])])  # fmt: skip
+    slopes, least = np.concatenate(columns, axis=1).T, np.concatenate(values)
+    d = points.shape[1]
+    best = linprog(
+        [*np.zeros(d), -1],
+        np.hstack([-slopes, np.ones((len(least), 1))]),
+        least,
+        bounds=[*[(-1e3, 1e3)] * d, (None, 1)],
+    )
+    return float(best.x[d])
+
+
+@every
+def test_what_one_free_node_cannot_mend_is_proved(random: np.random.Generator, key: str) -> None:
+    """An element of which one node is free, as HiGHS finds it: at places of another basis, and at denser ones."""
+    mesh, places = mesh_of(key), lattice(key)
+    depends, seen = dependence(random, key, places), set()
+    for _ in range(60):
+        points, node = perturbed(random, key, random.choice([0.05, 0.1])), int(random.integers(ELEMENTS[key].nodes))
+        free = (np.arange(len(points)) == node).astype(np.uint8)
+        fixed = jacobians(key, points, places)[~depends[:, node]].min(initial=1.0)
+        best = optimum(key, points, [list(range(len(points)))], node, [places[depends[:, node]]])
+        if abs(fixed) < 1e-9 or abs(best) < 1e-9:
+            continue
+        mark = mesh.impossible(points, free)[0]
+        assert mark == (fixed < 0 or best < 0)
+        seen.add(int(mark))
+        if mark:  # no position is any good
+            for step in random.normal(size=(8, points.shape[1])):
+                moved = points + np.outer(free, step)
+                assert mesh.judge(moved, 1)[0][0] != VALID
+    assert seen == {0, 1}
+
+
+@every
+def test_what_is_fixed_and_not_valid_is_proved(random: np.random.Generator, key: str) -> None:
+    """Also where it is invalid inside alone."""
+    mesh, free = mesh_of(key), np.zeros(ELEMENTS[key].nodes, dtype=np.uint8)
+    for nodes in doubtful(random, key, 40):
+        assert mesh.impossible(nodes, free)[0] == (mesh.judge(nodes, 1)[0][0] != VALID)
+
+
+def around_an_edge() -> tuple[Array, list[list[int]], int]:
+    """Return straight tetrahedra of second order around one edge: points, elements, and the middle of the edge."""
     around = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]], dtype=float)
     corners = np.concatenate([[[0, 0, 0], [0, 0, 1]], around + np.array([0, 0, 0.5])])
     between = kernels.QUADRATIC_SHAPES[CODES["tetra10"]][1]
@@ -262,42 +331,60 @@ def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.ra
         tetra = [0, 2 + k, 2 + (k + 1) % 4, 1]
         ends = [tuple(sorted(tetra[c] for c in mean)) for mean in between]
         rows.append([one[0] if len(one) == 1 else numbers.setdefault(one, 6 + len(numbers)) for one in ends])
-    straight = np.concatenate([corners, [corners[list(ends)].mean(axis=0) for ends in numbers]])
-    mesh = kernels.QuadraticMesh(
-        np.full(4, CODES["tetra10"], dtype=np.uint8), np.array(rows, dtype=np.int32).ravel(), len(straight)
-    )
-    middle = numbers[0, 1]
-    free = np.zeros(len(straight), dtype=np.uint8)
-    free[middle] = 1
-    proved = 0
-    for _ in range(200):
-        points = straight + 0.25 * random.normal(size=straight.shape) * (np.arange(len(straight)) > 5)[:, None]
-        points[middle] = straight[middle]
+    points = np.concatenate([corners, [corners[list(ends)].mean(axis=0) for ends in numbers]])
+    return points, rows, numbers[0, 1]
+
+
+def mesh_around(rows: list[list[int]], n: int) -> kernels.QuadraticMesh:
+    codes = np.full(len(rows), CODES["tetra10"], dtype=np.uint8)
+    return kernels.QuadraticMesh(codes, np.array(rows, dtype=np.int32).ravel(), n)
+
+
+def expected(points: Array, rows: list[list[int]], free: set[int], depends: NDArray[np.bool_]) -> tuple[Array, float]:
+    """Return for each element the smallest det J that nothing free changes, and the worst optimum of one free node."""
+    places, best, fixed = lattice("tetra10"), 1.0, []
+    for row in rows:
+        changed = (np.isin(row, list(free)) & depends).any(axis=1)
+        fixed.append(jacobians("tetra10", points[row], places[~changed]).min(initial=1.0))
+    for node in free:
+        some, at = [row for row in rows if node in row], []
+        for row in some:
+            others = (np.isin(row, list(free - {node})) & depends).any(axis=1)
+            at.append(places[depends[:, row.index(node)] & ~others])
+        if any(map(len, at)):
+            best = min(best, optimum("tetra10", points, some, node, at))
+    return np.array(fixed), best
+
+
+def test_what_no_node_common_to_elements_mends_is_proved_together(random: np.random.Generator) -> None:
+    """The middle of one edge alone is free: proved where HiGHS finds no position, at both of its ends and between."""
+    straight, rows, middle = around_an_edge()
+    mesh, depends = mesh_around(rows, len(straight)), dependence(random, "tetra10", lattice("tetra10"))
+    free, seen = (np.arange(len(straight)) == middle).astype(np.uint8), set()
+    for _ in range(100):
+        points = straight + 0.12 * random.normal(size=straight.shape) * (np.arange(len(straight)) > 5)[:, None]
         marks = mesh.impossible(points, free)
-        optima = []
-        for end in (0, 3):  # the corners of each that are ends of the edge
-            columns, values = [], []
-            for row in rows:
-                share = (np.array(row) == middle).astype(float)
-                place = points[row]
-                slopes = kernels.quadratic_columns(place, CODES["tetra10"], share)
-                here = np.abs(
-                    kernels.quadratic_coefficients(place, CODES["tetra10"])[:, None] - det_at(place, end)
-                ).argmin()
-                columns.append(slopes[here])
-                values.append(det_at(place, end))
-            best = linprog(
-                [0, 0, 0, -1], np.hstack([-np.array(columns), np.ones((4, 1))]), values,
-                bounds=[*[(-1e3, 1e3)] * 3, (None, 1)],
-            )  # fmt: skip
-            optima.append(best.x[3])
-        assert (marks == 2).any() <= (min(optima) < 1e-9)  # without a tangent all are 0
-        if not (marks == 1).any():
-            assert (marks == 2).any() == (min(optima) < 1e-9)
-        proved += int((marks == 2).any())
-    assert proved
+        fixed, best = expected(points, rows, {middle}, depends)
+        assert (marks > 0).any() == (fixed.min() < 0 or best < 0)
+        assert (marks[fixed < 0] == 1).all()
+        seen.add(bool((marks == 2).any()))
+        if (marks == 2).any():  # these few exclude each other already
+            some = [row for row, one in zip(rows, marks > 0, strict=True) if one]
+            assert expected(points, some, {middle}, depends)[1] < 1e-9
+    assert seen == {False, True}
 
 
-def det_at(nodes: Array, corner: int) -> float:
-    """Return det J of a tetrahedron of second order at a corner."""
-    return float(jacobians("tetra10", nodes, positions("tetra10")[[corner]])[0])
+def test_what_no_tangent_of_a_common_edge_mends_is_proved_together(random: np.random.Generator) -> None:
+    """The far end of the edge is free as well: what is left are the corners at the near end, as HiGHS finds it."""
+    straight, rows, middle = around_an_edge()
+    mesh, depends = mesh_around(rows, len(straight)), dependence(random, "tetra10", lattice("tetra10"))
+    free, corner = np.isin(np.arange(len(straight)), [middle, 1]).astype(np.uint8), positions("tetra10")[:1]
+    seen = set()
+    for _ in range(200):
+        points = straight + 0.2 * random.normal(size=straight.shape) * (np.arange(len(straight)) > 5)[:, None]
+        marks = mesh.impossible(points, free)
+        tangent = optimum("tetra10", points, rows, middle, [corner] * len(rows))
+        fixed, best = expected(points, rows, {middle, 1}, depends)
+        assert (marks > 0).any() == (min(fixed.min(), best, tangent) < 1e-9)  # without a tangent all are 0
+        seen.add((bool((marks > 0).any()), tangent < 1e-9 and min(fixed.min(), best) > 0))
+    assert seen == {(False, False), (True, False), (True, True)}

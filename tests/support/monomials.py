@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -60,11 +61,15 @@ def jacobians(key: str, nodes: Array, at: Array) -> Array:
     return np.asarray(np.linalg.det(derivatives(key, nodes, at)))
 
 
+@cache
+def _from_nodes(key: str) -> Array:
+    """Return what makes values at the nodes weights of the monomials."""
+    return np.linalg.inv(np.stack([np.prod(positions(key) ** np.array(e), axis=1) for e in exponents(key)], axis=1))
+
+
 def derivatives(key: str, nodes: Array, at: Array) -> Array:
     """Return the derivatives (k, directions, d) of the position; see `jacobians`."""
-    powers = exponents(key)
-    basis = np.stack([np.prod(positions(key) ** np.array(e), axis=1) for e in powers], axis=1)
-    weights = np.linalg.solve(basis, nodes)  # of the monomials
+    powers, weights = exponents(key), _from_nodes(key) @ nodes  # of the monomials
     columns = []
     for axis in range(at.shape[1]):
         slopes = []

@@ -3,6 +3,7 @@
 
 #include "arrays.hpp"
 #include "quadratic/energy.hpp"
+#include "quadratic/proofs.hpp"
 #include "quadratic/sweep.hpp"
 #include "moves/lbfgs.hpp"
 

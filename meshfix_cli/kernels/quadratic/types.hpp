@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -99,6 +100,25 @@ class QuadraticType {
         find_dependence();
         find_at_nodes();
         find_halves();
+    }
+
+    // A place in an element: det J there as a sum of coefficients, and the nodes that it depends on, as bits.
+    struct Place {
+        Sum value;
+        std::uint32_t depends = 0;
+    };
+
+    // The places of a lattice with so many steps along each edge.
+    std::vector<Place> lattice(int steps) const {
+        std::vector<Place> found;
+        for (const Index& at : indices(std::vector<int>(factors.size(), steps))) {
+            Place place;
+            for (const auto& [index, i] : coefficient_)
+                if (const double weight = monomial(index, at, steps); weight != 0.0) place.value.push_back({i, multinomial(index) * weight});
+            for (int direction = 0; direction < dimension; ++direction) place.depends |= nodes_of(derivative(direction, at, steps), direction);
+            found.push_back(place);
+        }
+        return found;
     }
 
    private:
@@ -330,23 +350,41 @@ class QuadraticType {
                 depends[coefficient_of[p * rest.size() + k]] |= nodes_of(difference[0][p]) | rest[k];
     }
 
-    // Scaled differences times monomials in the barycentric coordinates of the node.
+    // Of the barycentric coordinates at / steps.
+    static double monomial(const Index& exponent, const Index& at, int steps) {
+        double value = 1.0;
+        for (std::size_t k = 0; k < at.size(); ++k)
+            for (int e = 0; e < exponent[k]; ++e) value *= static_cast<double>(at[k]) / steps;
+        return value;
+    }
+
+    // A derivative of the position as a sum of differences.
+    Sum derivative(int direction, const Index& at, int steps) const {
+        Sum found;
+        for (std::size_t p = 0; p < difference[direction].size(); ++p)
+            if (const double value = monomial(difference_index_[direction][p], at, steps); value != 0.0)
+                found.push_back({static_cast<int>(p), value});
+        return found;
+    }
+
+    // The nodes that a sum of differences depends on: those of control points may cancel each other.
+    std::uint32_t nodes_of(const Sum& differences, int direction) const {
+        constexpr double ROUNDING = 1e-12;
+        std::map<int, double> weights;
+        for (const Share& p : differences)
+            for (const Share& control : difference[direction][p.of])
+                for (const Share& node : control_of_nodes[control.of]) weights[node.of] += p.weight * control.weight * node.weight;
+        std::uint32_t bits = 0;
+        for (const auto& [node, weight] : weights)
+            if (std::fabs(weight) > ROUNDING) bits |= 1u << node;
+        return bits;
+    }
+
     void find_at_nodes() {
         at_node.resize(nodes);
-        for (int i = 0; i < nodes; ++i) {
-            const Index where = index_of(between[i]);
-            for (int direction = 0; direction < dimension; ++direction) {
-                Sum derivative;
-                for (std::size_t p = 0; p < difference[direction].size(); ++p) {
-                    double value = 1.0;
-                    const Index& exponent = difference_index_[direction][p];
-                    for (std::size_t k = 0; k < where.size(); ++k)
-                        for (int e = 0; e < exponent[k]; ++e) value *= 0.5 * where[k];
-                    if (value != 0.0) derivative.push_back({static_cast<int>(p), value});
-                }
-                at_node[i][direction] = derivative;
-            }
-        }
+        for (int i = 0; i < nodes; ++i)
+            for (int direction = 0; direction < dimension; ++direction)
+                at_node[i][direction] = derivative(direction, index_of(between[i]), 2);
     }
 
     // The half beside the first end of an edge: there the other end is the middle. Blossoms of degree 2.

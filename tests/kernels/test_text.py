@@ -267,3 +267,10 @@ def test_fields_are_read_as_fortran_and_nastran_do() -> None:
     for wrong in (b"1.5 -3", b"-", b"1-", b"a-3", b"1.5--3", b"1e5-3"):
         with pytest.raises(ReadError, match="is not a number"):
             fields_at(wrong, np.array([[0, len(wrong)]]))
+
+
+def test_a_short_card_does_not_lend_its_kind_to_the_next() -> None:
+    solid = "CTETRA  " + "".join(f"{value:8}" for value in (1, 1, 1, 2, 3, 4)) + "\n"
+    deck = (solid + "SPC\n" + solid).encode()
+    names, kinds, *_ = kernels.find_cards(deck)
+    assert bytes(names[:6]) == b"CTETRA" and kinds.tolist() == [0, 1, 0]

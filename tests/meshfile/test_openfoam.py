@@ -19,6 +19,7 @@ from meshfix_cli.errors import MeshfixError, ReadError
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.faces import Faces
+from meshfix_cli.meshfile.openfoam.lists import File
 
 SOLID = [name for name, make in MESHES.items() if make()[0].shape[1] == 3]
 FORMS = {
@@ -251,6 +252,13 @@ def test_what_is_missing_is_named(tmp_path: Path) -> None:
     (there / "owner").unlink()
     with pytest.raises(ReadError, match="there is no file owner"):
         read(folder)
+
+
+@pytest.mark.parametrize("sizes", ["label=40;scalar=64", "label=0;scalar=64", "label=32;scalar=128"])
+def test_numbers_have_32_or_64_bits(sizes: str) -> None:
+    header = f'FoamFile\n{{\n    format binary;\n    arch "LSB;{sizes}";\n    class labelList;\n}}\n'
+    with pytest.raises(ReadError, match="bits, and 32 or 64 are read"):
+        File.of(header.encode())
 
 
 def read_stream(path: Path) -> None:

@@ -265,7 +265,8 @@ inline Cards find_cards(const CardText& deck) {
     Cards cards(deck.size());
     Span named{0, 0};
     std::int64_t first = 0;        // the number of the first field of a line
-    std::string_view name = " ";  // the first columns of the last card, in a text of columns alone
+    constexpr std::string_view NO_NAME = "\n";
+    std::string_view name = NO_NAME;  // the first columns of the last card, in a text of columns alone, if there are eight
     bool large = false;
     for (std::int64_t at = 0; at < deck.size();) {
         if (plain && text.compare(at, 8, name) == 0) {  // as nearly always
@@ -283,7 +284,7 @@ inline Cards find_cards(const CardText& deck) {
         if (!line.continues(text)) {
             cards.add(line.name(text), line.begin);
             first = 0;
-            if (line.end >= line.begin + 8) name = text.substr(line.begin, 8);
+            name = line.end >= line.begin + 8 ? text.substr(line.begin, 8) : NO_NAME;
             large = line.large;
         } else if (cards.begin.empty()) {
             continue;

@@ -64,11 +64,14 @@ class File:
             raise ReadError("is not a readable file of OpenFOAM: it has no header")
         entries = {name.decode(): value.strip().decode("latin-1") for name, value in _ENTRY.findall(header[1])}
         sizes = dict(re.findall(r"(label|scalar)=(\d+)", entries.get("arch", "")))
+        label, scalar = (int(sizes.get(name, usual)) for name, usual in (("label", 32), ("scalar", 64)))
+        if not {label, scalar} <= {32, 64}:
+            raise ReadError(f"has labels of {label} and scalars of {scalar} bits, and 32 or 64 are read")
         binary = entries.get("format", "ascii") == "binary"
         return cls(
             data if binary else _without_comments(data, header.end()), header.end(), entries.get("class", ""), binary,
             ">" if "MSB" in entries.get("arch", "") else "<",
-            int(sizes.get("label", 32)) // 8, int(sizes.get("scalar", 64)) // 8,
+            label // 8, scalar // 8,
         )  # fmt: skip
 
     def labels(self, at: int | None = None) -> tuple[Labels, int]:

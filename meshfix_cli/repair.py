@@ -336,9 +336,10 @@ class Judge:
                 slides = {**self._slid(before, result), "ceiling_without_sliding": ceiling(start.held, self.threads)}
             more["facts"] = {**(more.get("facts") or {}), **slides}
         if result.surface is not None and not self.brief:
+            from meshfix_cli.quality.obstacles import crossings_of_surface
             from meshfix_cli.report.happened import crossings
 
-            notes += crossings(result, self.threads)
+            notes += crossings(crossings_of_surface(result, self.threads))
         return Report(
             name=document.name,
             command=command,
@@ -430,7 +431,11 @@ def repair(
     # Processes write what they hold: not the nodes between corners.
     result, written = files.write(document, after, output, put if document.ties is None else None)
     asked = method.smooth and not method.only_invalid and reference is None
-    notes = (*slid, *what_happened(document, bool(asked), outcome, after, rounded), *written)
+    happened = what_happened(
+        outcome, after, all_judged=not document.not_judged, asked=bool(asked), rounded=rounded,
+        kind=document.source.points.dtype.name,
+    )  # fmt: skip
+    notes = (*slid, *happened, *written)
     if result.surface is not None:
         from meshfix_cli.meshfile.surfaces import laid_as
 

@@ -111,6 +111,17 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
     )
 
 
+def crossings_of_surface(mesh: Mesh, threads: int = 1) -> int:
+    """Count the pairs of elements of a surface that cross each other, of each element the first 16."""
+    from meshfix_cli.mesh.surface import facets_of
+
+    facets = facets_of(mesh.topology)
+    triangles = facets[:, :3]
+    if facets.shape[1] == 4:
+        triangles = np.concatenate([triangles, facets[facets[:, 3] >= 0][:, [0, 2, 3]]])
+    return len(kernels.crossings(mesh.along_curve(mesh.points), np.ascontiguousarray(triangles), threads))
+
+
 def _of_surface(mesh: Mesh, threads: int) -> Obstacles:
     """Return the elements of a surface that are turned over and have no free vertex; it may cross itself."""
     stuck, none = mesh.stuck(threads), np.empty(0, dtype=np.int32)

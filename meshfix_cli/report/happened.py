@@ -6,19 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import counted
-from meshfix_cli.mesh.surface import facets_of
 from meshfix_cli.solve.quadratic import giving_way
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
-    from meshfix_cli.meshfile.document import Document
-    from meshfix_cli.repair import Curving
     from meshfix_cli.solve.records import Outcome
 
 
-def of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, threads: int) -> tuple[str, ...]:
+def of_boundary(before: Mesh, after: Mesh, curving: str, reach: float, threads: int) -> tuple[str, ...]:
     """Say how far curved edges of the boundary gave way, or would have to."""
     assert after.quadratic is not None
     ways = np.linalg.norm(after.points - before.points, axis=1)[after.quadratic.giving]
@@ -34,14 +30,28 @@ def of_boundary(before: Mesh, after: Mesh, curving: Curving, reach: float, threa
     return (f"--curving relax would move {many} by at most {far}, and all elements are valid then",)
 
 
-def what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh, rounded: int) -> tuple[str, ...]:
-    """Say that nothing was to be done, or that the file's numbers are too coarse: so many are inverted as rounded.
+def what_happened(
+    outcome: Outcome, after: Mesh, *, all_judged: bool, asked: bool, rounded: int, kind: str
+) -> tuple[str, ...]:
+    """Say that nothing was to be done, or that the file's numbers are too coarse.
 
-    `asked`: better elements were asked for.
+    Parameters
+    ----------
+    outcome : Outcome
+    after : Mesh
+        What is written.
+    all_judged : bool
+        Nothing is held that could not be judged.
+    asked : bool
+        Better elements were asked for.
+    rounded : int
+        How many elements are inverted as rounded.
+    kind : str
+        Of the file's numbers.
     """
-    nothing = "no element that is judged" if document.not_judged else "no element"
-    none = "no angle" if document.mesh.topology.simplicial else "none"
-    if document.mesh.quadratic is not None and outcome.after is outcome.before and outcome.valid:
+    nothing = "no element" if all_judged else "no element that is judged"
+    none = "no angle" if after.topology.simplicial else "none"
+    if after.quadratic is not None and outcome.after is outcome.before and outcome.valid:
         return (f"{nothing} is inverted, and no coefficient is small: nothing was moved",)
     if outcome.after is outcome.before and outcome.valid:
         if len(outcome.records) > 1:
@@ -50,7 +60,6 @@ def what_happened(document: Document, asked: bool, outcome: Outcome, after: Mesh
         return (f"{nothing} is inverted{angles}: nothing was moved",)
     if outcome.records[-1].inverted or not rounded:
         return ()
-    kind = document.source.points.dtype.name
     way_out = "; --double stores them as they are" if kind == "float32" else ""
     written = "" if after is outcome.after else ", so the mesh before that is written"
     inverted = counted(rounded, "element", "elements")
@@ -67,12 +76,8 @@ def folded_at_first(outcome: Outcome, referred: bool) -> tuple[str, ...]:
     return ("the surface was folded: its shape is what its points tell; --reference names the mesh before",)
 
 
-def crossings(mesh: Mesh, threads: int) -> tuple[str, ...]:
-    """Say where a surface crosses itself, which is left as it is."""
-    facets = facets_of(mesh.topology)
-    corners = facets[:, 3:4] >= 0
-    triangles = np.concatenate([facets[:, :3], facets[corners.ravel()][:, [0, 2, 3]]]) if corners.size else facets
-    pairs = kernels.crossings(mesh.along_curve(mesh.points), np.ascontiguousarray(triangles), threads)
-    if not len(pairs):
+def crossings(pairs: int) -> tuple[str, ...]:
+    """Say at how many pairs of elements a surface crosses itself, which is left as it is."""
+    if not pairs:
         return ()
-    return (f"the surface crosses itself, at {counted(len(pairs), 'pair', 'pairs')} of elements, and is left so there",)
+    return (f"the surface crosses itself, at {counted(pairs, 'pair', 'pairs')} of elements, and is left so there",)

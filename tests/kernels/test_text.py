@@ -273,4 +273,4 @@ def test_a_short_card_does_not_lend_its_kind_to_the_next() -> None:
     solid = "CTETRA  " + "".join(f"{value:8}" for value in (1, 1, 1, 2, 3, 4)) + "\n"
     deck = (solid + "SPC\n" + solid).encode()
     names, kinds, *_ = kernels.find_cards(deck)
-    assert bytes(names[:6]) == b"CTETRA" and kinds.tolist() == [0, 1, 0]
+    assert bytes(names.ravel()[:6]) == b"CTETRA" and kinds.tolist() == [0, 1, 0]

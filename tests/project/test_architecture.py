@@ -34,6 +34,7 @@ ROOMS: dict[str, set[str]] = {
 }
 KERNEL_ROOMS: dict[str, set[str]] = {
     "quadratic": {"moves", "measures", "mesh", "common"},
+    "surface": {"moves", "measures", "mesh", "common"},
     "moves": {"measures", "mesh", "common"},
     "measures": {"mesh", "common"},
     "mesh": {"common"},

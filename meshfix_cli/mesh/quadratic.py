@@ -66,6 +66,8 @@ class Quadratic:
         Points, in VTK's order, positively oriented.
     n : int
         Number of points.
+    ties : Ties
+        Between which corners nodes lie, of these elements and maybe of others.
     kernel : kernels.QuadraticMesh
     """
 
@@ -86,7 +88,7 @@ class Quadratic:
         self.offsets = np.concatenate([[0], np.cumsum(np.array([one.nodes for one in SECOND_ORDER])[self.codes])])
         self.n = n
         self.rows = np.arange(len(self.codes)) if rows is None else rows
-        self._ties = ties or ties_of([(ELEMENTS[key], nodes) for key, nodes in blocks], n)[0]
+        self.ties = ties or ties_of([(ELEMENTS[key], nodes) for key, nodes in blocks], n)[0]
         self.free = self.used & ~self.corners
         self.giving = np.zeros(n, dtype=bool)
         self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n)
@@ -108,7 +110,7 @@ class Quadratic:
     @cached_property
     def corners(self) -> Mask:
         """(n,) bool: the points that are corners of elements."""
-        return self.used & ~self._ties.nodes
+        return self.used & ~self.ties.nodes
 
     @cached_property
     def used(self) -> Mask:
@@ -120,7 +122,7 @@ class Quadratic:
     def straight(self, points: Array) -> Array:
         """Return points (n, d) with each node that is no corner where the straight element has it."""
         found = points.copy()
-        for tie in self._ties.groups:
+        for tie in self.ties.groups:
             found[tie.nodes] = tie.middle(points)
         return found
 

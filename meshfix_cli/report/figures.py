@@ -14,6 +14,7 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.mixed import MixedTopology
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import WITHIN, Summary, worst_first
+from meshfix_cli.report.curves import Curves
 from meshfix_cli.report.facts import Report, centroids, names
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
@@ -202,14 +203,15 @@ def convergence(records: Sequence[SweepRecord]) -> Convergence:
 def scene(meshes: Mapping[str, Mesh], inverted: Mapping[str, Rows], worst: NDArray[np.int64]) -> Scene:
     """Return the picture of the stages of a mesh; `inverted` and `worst` are rows of its elements."""
     result, mesh = list(meshes.items())[-1]
-    boundary, facets, coarse = _coarser(*_boundary(mesh))
-    flat = mesh.points.shape[1] == 2
-    whole = flat and mesh.topology.m <= MOST_CELLS
-    drawn = partial(_whole_state, _numbered(mesh, np.arange(mesh.topology.m))) if whole else _partial_state
+    curves = Curves(list(meshes.values()))
+    boundary, facets, creases, coarse = _boundary(mesh, curves)
+    whole = mesh.points.shape[1] == 2 and mesh.topology.m <= MOST_CELLS
+    cells = curves.refined(_numbered(mesh, np.arange(mesh.topology.m)), shared=True) if whole else {}
+    drawn = partial(_whole_state, curves, cells) if whole else partial(_partial_state, curves)
     return Scene(
         boundary=boundary,
         facets=facets,
-        creases=np.empty((0, 2), dtype=np.int32) if coarse or flat else _creases(boundary, facets),
+        creases=creases,
         coarse=coarse,
         states={
             name: _with_off(drawn(mesh, inverted[name], worst if name == result else worst[:0]), mesh)
@@ -254,16 +256,16 @@ def _numbered(mesh: Mesh, rows: NDArray[np.integer[Any]]) -> dict[str, Rows]:
     return cells
 
 
-def _whole_state(cells: Cells, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
-    points = mesh.along_curve(mesh.points)
-    return State(points, cells, _numbered(mesh, inverted), _numbered(mesh, worst), left_out=0)
+def _whole_state(curves: Curves, cells: Cells, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
+    wrong, worst_ones = (curves.refined(_numbered(mesh, rows)) for rows in (inverted, worst))
+    return State(curves.points(mesh), cells, wrong, worst_ones, left_out=0)
 
 
-def _partial_state(mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
+def _partial_state(curves: Curves, mesh: Mesh, inverted: Rows, worst: NDArray[np.int64]) -> State:
     # Spread, so that what is left out is left out everywhere.
     some = inverted[np.linspace(0, len(inverted) - 1, min(len(inverted), MOST_INVERTED)).astype(np.int64)]
-    groups = [_numbered(mesh, some), _numbered(mesh, worst)]
-    points, (wrong, worst_ones) = _compact(mesh.along_curve(mesh.points), groups)
+    groups = [curves.refined(_numbered(mesh, rows)) for rows in (some, worst)]
+    points, (wrong, worst_ones) = _compact(curves.points(mesh), groups)
     return State(points, {}, wrong, worst_ones, left_out=len(inverted) - len(some))
 
 
@@ -294,8 +296,21 @@ def _compact(points: Points, groups: Sequence[Cells]) -> tuple[Points, list[dict
     return points[used], [{key: next(parts).reshape(rows.shape) for key, rows in cells.items()} for cells in groups]
 
 
-def _boundary(mesh: Mesh) -> tuple[Points, dict[str, Rows]]:
-    """Return the vertices (k, d) and the oriented facets of the boundary; of a surface all elements."""
+def _boundary(mesh: Mesh, curves: Curves) -> tuple[Points, dict[str, Rows], Rows, bool]:
+    """Return the points (k, d), the oriented facets and the creases of the boundary, and whether that is coarse."""
+    straight = mesh.along_curve(mesh.points)
+    facets, none = _facets(mesh), np.empty((0, 2), dtype=np.int32)
+    if number_of(facets) > MOST_FACETS:
+        points, (facets,) = _compact(straight, [facets])
+        return *_coarser(points, facets), none, True
+    creases = none if straight.shape[1] == 2 else _creases(straight, facets)
+    groups = [curves.refined(facets, shared=True), curves.refined({"line": creases})]
+    points, (facets, lines) = _compact(curves.points(mesh), groups)
+    return points, facets, lines["line"], False
+
+
+def _facets(mesh: Mesh) -> dict[str, Rows]:
+    """Return the oriented facets of the boundary, by the vertices of the connectivity; of a surface all elements."""
     topology, connectivity = mesh.topology, mesh.topology.connectivity
     facets: dict[str, Rows] = {}
     if mesh.surface is not None:
@@ -311,17 +326,14 @@ def _boundary(mesh: Mesh) -> tuple[Points, dict[str, Rows]]:
             for position, corners in enumerate(topology.element.shape.facets)
         ]
         facets[FACETS[mesh.dimension]] = np.concatenate(parts)
-    points, (compact,) = _compact(mesh.along_curve(mesh.points), [facets])
-    return points, compact
+    return facets
 
 
-def _coarser(points: Points, facets: dict[str, Rows]) -> tuple[Points, dict[str, Rows], bool]:
-    """Join the vertices in each cell of a grid, as coarse as it takes for `MOST_FACETS`; True: it was needed."""
-    if number_of(facets) <= MOST_FACETS:
-        return points, facets, False
+def _coarser(points: Points, facets: Cells) -> tuple[Points, dict[str, Rows]]:
+    """Join the vertices in each cell of a grid, as coarse as it takes for `MOST_FACETS`."""
     halves = np.concatenate([_triangles(rows) for rows in facets.values()])
     points, (merged,) = _compact(points, [{FACETS[halves.shape[1]]: _merged(points, halves)}])
-    return points, merged, True
+    return points, merged
 
 
 def _triangles(facets: Rows) -> Rows:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from meshfix_cli.errors import WriteError, on_one_line
+from meshfix_cli.report.curves import surface
 from meshfix_cli.report.facts import Binned, Report, binned
 from meshfix_cli.report.figures import Cells, Convergence, Figures, Points, Scene, State, number_of
 
@@ -109,7 +110,8 @@ def _picture(axes: Axes, scene: Scene, state: State) -> None:
     from matplotlib.collections import LineCollection, PolyCollection
 
     middle, extent = scene.frame
-    roles = (state.cells, "none", "0.25"), (state.worst, AMBER, "k"), (state.inverted, f"{RED}8c", RED)
+    whole = {key: rows for key, rows in state.cells.items() if key != "line"}  # the edges of those that are curved
+    roles = (whole, "none", "0.25"), (state.worst, AMBER, "k"), (state.inverted, f"{RED}8c", RED)
     for cells, face, line in roles:
         many = number_of(cells) > MOST_LINES
         polygons = PolyCollection(
@@ -125,8 +127,8 @@ def _picture(axes: Axes, scene: Scene, state: State) -> None:
 
 
 def _places(points: Points, cells: Cells) -> list[Points]:
-    """Return where the vertices (nodes, d) of each element are."""
-    return [corners for rows in cells.values() for corners in points[rows]]
+    """Return where the vertices (nodes, d) of each element are, as they go round it."""
+    return [corners for key, rows in cells.items() for corners in points[rows[:, surface(key).outline]]]
 
 
 def _window(middle: Points, extent: Points, state: State) -> tuple[Points, Points]:

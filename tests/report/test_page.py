@@ -20,12 +20,14 @@ from typing import TYPE_CHECKING, Any
 import meshio
 import numpy as np
 import pytest
+from bent import curved, mesh_of, straight
 from elements import MESHES
 from numpy.typing import NDArray
 from places import SAMPLES
 from reports import FIRST, built, report_on, tangled
 
 from meshfix_cli import read
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.repair import Judge
 from meshfix_cli.report import figures
@@ -226,6 +228,24 @@ def test_a_browser_draws_elements_of_every_type(visit: Open, of_every_type: dict
         assert tab.locator("#drawn").inner_text() == f"smoothed: 0 inverted elements; in the middle {number}"
     assert red(before).sum() > 4_000 > 50 > red(after).sum()
     assert amber(closer).sum() > amber(after).sum() > 50
+
+
+@pytest.mark.parametrize("key", ["triangle6", "quad8", "tetra10", "hexahedron27"])
+def test_a_browser_draws_curved_elements(visit: Open, tmp_path: Path, key: str) -> None:
+    """Their edges in pieces; where nothing is curved the page has no lines but those of the sides."""
+    quadratic, points, free = curved(key, 0.8)
+    mesh = mesh_of(quadratic, points, key, straight(key)[1], free)
+    flat = mesh.with_points(quadratic.straight(points))
+    for name, meshes in (("curved", (mesh, flat)), ("flat", (flat, flat))):
+        report = report_on(*meshes, command="untangle")
+        (tmp_path / f"{name}.html").write_text(page(report, figures_of(report), {}), encoding="utf-8")
+    scenes = {name: embedded(tmp_path / f"{name}.html", "scene") for name in ("curved", "flat")}
+    pieces = {layer["shape"] for layer in scenes["curved"]["layers"] if layer["role"] == "inverted"}
+    assert all(len(scenes["curved"]["shapes"][one]["edges"]) >= 4 * ELEMENTS[key].shape.corners for one in pieces)
+    assert not any("edges" in shape for shape in scenes["flat"]["shapes"].values())
+    with visit(tmp_path / "curved.html") as tab:
+        before, after = settled(tab), stage(tab, "smoothed")
+    assert red(before).sum() > 1_000 > 50 > red(after).sum()
 
 
 def test_options_and_versions_are_there(tmp_path: Path) -> None:

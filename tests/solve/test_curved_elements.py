@@ -3,64 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from geometries import grid
+from bent import FAMILIES, curved, mesh_of, straight
 from numpy.typing import NDArray
-from refined import COMPLETE, SERENDIPITY, refined
 
-from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.judged import VALID
-from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.quadratic import Array, Quadratic
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.quadratic import POOR, Limits, relaxed, steps
 
-SQUARE = np.linspace(0, 1, 4)
-FAMILIES = {
-    "triangle6": ("triangle", SERENDIPITY), "quad8": ("quad", SERENDIPITY), "quad9": ("quad", COMPLETE),
-    "tetra10": ("tetra", SERENDIPITY), "wedge15": ("wedge", SERENDIPITY), "wedge18": ("wedge", COMPLETE),
-    "hexahedron20": ("hexahedron", SERENDIPITY), "hexahedron27": ("hexahedron", COMPLETE),
-}  # fmt: skip
 every = pytest.mark.parametrize("key", list(FAMILIES))
-
-
-def straight(key: str) -> tuple[Array, NDArray[np.int32]]:
-    """A grid of elements of second order."""
-    kind, types = FAMILIES[key]
-    axes = (SQUARE,) * ELEMENTS[kind].shape.dimension
-    points, rows = _grid(kind, axes)
-    points, blocks = refined(points, [(kind, rows)], types)
-    return points, blocks[0][1]
-
-
-def _grid(kind: str, axes: tuple[Array, ...]) -> tuple[Array, NDArray[np.int32]]:
-    if kind in ("triangle", "tetra"):
-        return grid(*axes)
-    shape = tuple(map(len, axes))
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
-    first = np.stack(np.meshgrid(*(np.arange(n - 1) for n in shape), indexing="ij"), axis=-1).reshape(-1, len(axes))
-    corners = [(0, 0), (1, 0), (1, 1), (0, 1)] if len(axes) == 2 else [
-        (*base, z) for z in (0, 1) for base in ((0, 0), (1, 0), (1, 1), (0, 1))
-    ]  # fmt: skip
-    rows = np.stack([np.ravel_multi_index(tuple((first + c).T), shape) for c in corners], axis=1).astype(np.int32)
-    if kind == "wedge":
-        rows = np.concatenate([rows[:, [0, 1, 2, 4, 5, 6]], rows[:, [0, 2, 3, 4, 6, 7]]])
-    return points, rows
-
-
-def curved(key: str, size: float = 0.25, seed: int = 0) -> tuple[Quadratic, Array, NDArray[np.bool_]]:
-    """The grid with nodes inside that are moved at random, and some of them too far; which are free."""
-    points, rows = straight(key)
-    quadratic = Quadratic([(key, rows)], len(points))
-    inside = np.asarray(((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1))
-    moved = inside & ~quadratic.corners
-    random = np.random.default_rng(seed)
-    points = points + size / 3 * random.uniform(-1, 1, points.shape) * moved[:, None]
-    return quadratic, points, inside
 
 
 def repaired(quadratic: Quadratic, points: Array, limits: Limits, floor: float | None = 0.5) -> Array:
@@ -137,11 +92,6 @@ def test_the_boundary_gives_way_by_little() -> None:
     assert not ways[:, 1].any()
 
 
-def mesh_of(quadratic: Quadratic, points: Array, rows: NDArray[np.int32], free: NDArray[np.bool_]) -> Mesh:
-    mesh = Mesh.build(points, [("triangle", rows[:, :3])])
-    return replace(mesh, quadratic=quadratic.holding(~free, ~free & ~quadratic.corners))
-
-
 def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
     """At the corner of a square one element alone lies between two edges, which turn past each other."""
     points, rows = straight("triangle6")
@@ -151,7 +101,7 @@ def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
     one, other = rows[element, [3 + place, 3 + (place + 2) % 3]]
     ways = points[[one, other]] - points[alone]
     points[[one, other]] += 1.2 * ways[::-1]
-    mesh = mesh_of(quadratic, points, rows, free)
+    mesh = mesh_of(quadratic, points, "triangle6", rows, free)
     outcome = Method().solve(mesh, math.inf, 1)
     assert outcome.obstacles.inverted.tolist() == [element]
     assert outcome.records[-1].inverted == 1
@@ -169,7 +119,7 @@ def test_tangled_corners_are_mended_first_and_nodes_go_along() -> None:
     corners = free & quadratic.corners
     tangled = points + 0.5 * random.uniform(-1, 1, points.shape) * corners[:, None]
     tangled = quadratic.follow(points, tangled)
-    mesh = mesh_of(quadratic, tangled, rows, free)
+    mesh = mesh_of(quadratic, tangled, "triangle6", rows, free)
     before, outcome = mesh.check()[0], Method().solve(mesh, math.inf, 1)
     assert before
     assert outcome.valid

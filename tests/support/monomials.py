@@ -56,6 +56,12 @@ def inside(random: np.random.Generator, key: str, count: int) -> Array:
     return at[:count]
 
 
+def mapped(key: str, nodes: Array, at: Array) -> Array:
+    """Return the positions (k, d) in an element with nodes (n, d) at parameters (k, d)."""
+    values = np.stack([np.prod(at ** np.array(e), axis=1) for e in exponents(key)], axis=1)
+    return np.asarray(values @ _from_nodes(key) @ nodes)
+
+
 def jacobians(key: str, nodes: Array, at: Array) -> Array:
     """Return det J (k,) of an element with nodes (n, d) at parameters (k, d)."""
     return np.asarray(np.linalg.det(derivatives(key, nodes, at)))

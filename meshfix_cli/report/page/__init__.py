@@ -18,8 +18,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import ELEMENTS, Shape, counted
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.report.as_json import to_json
+from meshfix_cli.report.curves import surface
 from meshfix_cli.report.facts import (
     Report,
     binned,
@@ -303,15 +304,16 @@ def _scene(scene: Scene) -> dict[str, Any]:
         "extent": (extent / np.linalg.norm(extent)).tolist(),
         "points": [_base64(_placed(one, scene)) for one in points],
         "rows": [_numbered(one) for one in rows.values()],
-        "shapes": {layer["shape"]: _surface(ELEMENTS[layer["shape"]].shape) for layer in layers},
+        "shapes": {layer["shape"]: _surface(layer["shape"]) for layer in layers},
         "layers": layers,
     }
 
 
-def _surface(shape: Shape) -> dict[str, Any]:
-    """Return the number of corners, and the corners of each polygon."""
-    flat = [list(range(shape.corners))]
-    return {"corners": shape.corners, "sides": list(shape.facets) if shape.dimension == 3 else flat}
+def _surface(key: str) -> dict[str, Any]:
+    """Return the number of corners, the corners of each polygon and, where these are not its sides, of each line."""
+    drawn = surface(key)
+    told = {"corners": drawn.corners, "sides": drawn.sides}
+    return told if drawn.edges is None else {**told, "edges": [pair for edge in drawn.edges for pair in pairwise(edge)]}
 
 
 def _numbered(rows: NDArray[np.int32]) -> dict[str, Any]:

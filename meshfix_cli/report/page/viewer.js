@@ -110,8 +110,9 @@
     return sides.flatMap((side) => side.slice(2).map((corner, i) => [side[0], side[i + 1], corner]));
   }
 
-  // Pairs of corners: of a solid each edge once, of a polygon or a line as its sides go round.
-  function edges({ sides }) {
+  // Pairs of corners, each once; a polygon's go round it.
+  function edges({ sides, edges }) {
+    if (edges) return edges;
     const around = sides.flatMap((side) => side.map((corner, i) => [corner, side[(i + 1) % side.length]]));
     if (sides.length > 1) return around.filter(([a, b]) => a < b);
     return sides[0].length > 2 ? around : around.slice(0, 1);

@@ -259,8 +259,10 @@ class Method:
         floor = 1.0 if self.smooth == "best" else RAISED if self.smooth and not self.only_invalid else None
         untangling = replace(self, smooth=SMOOTH if self.smooth and not self.only_invalid else 0)
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
-        relax = self.curving == "relax"
-        return curved_steps(mesh, straight, floor=floor, relax=relax, max_move=reach, threads=threads)
+        return curved_steps(
+            mesh, straight, floor=floor, relax=self.curving == "relax", max_move=reach, threads=threads,
+            sweeps=self.sweeps,
+        )  # fmt: skip
 
 
 def as_surface(document: Document) -> Document:

@@ -69,7 +69,21 @@ class Limits:
     threads: int = 1
 
 
-def steps(mesh: Quadratic, points: Array, limits: Limits, floor: float | None = RAISED) -> Iterator[Step]:
+class Budget:
+    """How many untangling sweeps are left; what is tried is one, whether or not it is any good. None: no end."""
+
+    def __init__(self, sweeps: int | None = None) -> None:
+        self.left = math.inf if sweeps is None else sweeps
+
+    def take(self) -> bool:
+        """Use one up, if there is one."""
+        self.left -= 1
+        return self.left >= 0
+
+
+def steps(
+    mesh: Quadratic, points: Array, limits: Limits, floor: float | None = RAISED, budget: Budget | None = None
+) -> Iterator[Step]:
     """Yield what is done and the points (n, d) after it; the last are never worse than the first.
 
     Parameters
@@ -80,16 +94,19 @@ def steps(mesh: Quadratic, points: Array, limits: Limits, floor: float | None = 
     floor : float or None
         How far coefficients are raised, relative to the straight element, where one is below `POOR`, and in any case if
         this is 1; None: no farther than validity takes.
+    budget : Budget, optional
+        Of what untangles.
     """
-    run = _Run(mesh, points, limits)
+    run = _Run(mesh, points, limits, budget)
     yield from run.untangle()
     if floor is not None and run.left == 0 and (floor == 1 or run.smallest < POOR):
         yield from run.raise_to(floor)
 
 
 class _Run:
-    def __init__(self, mesh: Quadratic, points: Array, limits: Limits) -> None:
+    def __init__(self, mesh: Quadratic, points: Array, limits: Limits, budget: Budget | None = None) -> None:
         self.mesh, self.limits, self.points, self.rest = mesh, limits, points, points
+        self.budget = budget or Budget()
         self.free = limits.free & mesh.used
         self.sizes = mesh.kernel.sizes(points, limits.threads)
         self._look()
@@ -116,7 +133,8 @@ class _Run:
     def untangle(self, regions: tuple[int, ...] = RINGS) -> Iterator[Step]:
         """Look for valid positions: of the nodes between corners, and where these do not suffice of corners as well."""
         for free in (self.free & ~self.mesh.corners, self.free):
-            yield from self._programmes(free)
+            if self.left and self.budget.take():
+                yield from self._programmes(free)
             for rings in regions:
                 if self.left:
                     yield from self._minimise(free & self.mesh.near(self.low, rings))
@@ -153,6 +171,8 @@ class _Run:
             return
         energy, eps = self._energy(region), 1.0
         for _ in range(MINIMISATIONS):
+            if not self.budget.take():
+                return
             least = energy.minimise(eps, 0.0, ITERATIONS)[2]
             yield from self._try(ENERGY, energy.points(self.points.shape[1]))
             if least > 0 or self.left == 0:
@@ -250,7 +270,14 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
 
 
 def curved_steps(
-    mesh: Mesh, straight: Callable[[Mesh], Steps], *, floor: float | None, relax: bool, max_move: float, threads: int
+    mesh: Mesh,
+    straight: Callable[[Mesh], Steps],
+    *,
+    floor: float | None,
+    relax: bool,
+    max_move: float,
+    threads: int,
+    sweeps: int | None = None,
 ) -> Steps:
     """Yield a mesh of curved elements and a record, as it came and after each step; see `untangle.steps`.
 
@@ -261,7 +288,7 @@ def curved_steps(
     mesh : Mesh
         With its `quadratic` elements.
     straight : callable
-        Untangles the straight elements.
+        Untangles the straight elements, in as many sweeps as are allowed.
     floor : float or None
         See `steps`.
     relax : bool
@@ -269,8 +296,10 @@ def curved_steps(
     max_move : float
         No node goes farther from where it was, in model units.
     threads : int
+    sweeps : int, optional
+        Limit of those that untangle, these of straight elements among them; that the boundary gives way is one.
     """
-    quadratic = mesh.quadratic
+    quadratic, budget = mesh.quadratic, Budget(sweeps)
     assert quadratic is not None
     clock, limits = _Clock(mesh, threads), _limits(mesh, mesh.points, max_move, threads)
     first = clock.record("input", mesh)
@@ -281,22 +310,23 @@ def curved_steps(
             followed = quadratic.follow(mesh.points, moved.points)
             best = replace(moved, quadratic=quadratic).with_points(followed)
             if record.sweep:
+                budget.left -= not record.phase.startswith(SMOOTHING)
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
     for start in [best] if best is mesh or best.check(threads)[0] < first.inverted else [best, mesh]:
         best = start
-        for name, points in steps(quadratic, start.points, limits, floor):
+        for name, points in steps(quadratic, start.points, limits, floor, budget):
             best = start.with_points(points)
             yield best, clock.record(name, best)
         if best.check(threads)[0] == 0:
             return
         found.append(best)
     best = min(found, key=lambda one: _rank(one, threads))
-    if relax:
+    if relax and budget.take():
         given = relaxed(quadratic, best.points, limits, quadratic.giving)
         if given is not None:
             best = best.with_points(given)
             yield best, clock.record(RELAXING, best)
-            for name, points in steps(quadratic, given, limits, floor):
+            for name, points in steps(quadratic, given, limits, floor, budget):
                 best = best.with_points(points)
                 yield best, clock.record(name, best)
     if clock.points is not best.points:

@@ -103,6 +103,25 @@ def test_moves_are_bounded_and_only_what_is_invalid_moves(tmp_path: Path) -> Non
     assert report("quality", tmp_path / "few.vtu")["inverted"] == 0
 
 
+def test_sweeps_are_limited(tmp_path: Path) -> None:
+    """Those of straight elements, where corners are tangled, and each step of curved ones; not what smooths."""
+    nodes, corners = box(tmp_path / "nodes.vtu"), box(tmp_path / "corners.vtu")
+    mesh = meshio.read(corners)
+    inside = np.asarray(((mesh.points > 1e-9) & (mesh.points < 1 - 1e-9)).all(axis=1))[: len(POINTS)]
+    mesh.points[: len(POINTS)][inside] += np.random.default_rng(1).uniform(-0.4, 0.4, (int(inside.sum()), 3))
+    mesh.write(corners)
+    for source in (nodes, corners):
+        words = ["untangle", "--allow-inverted", "--curving", "relax", source, tmp_path / "out.vtu"]
+        needed = [one for one in report(*words)["sweeps"] if one["sweep"] and "smoothing" not in one["phase"]]  # type: ignore[attr-defined]
+        for most in (0, 1, len(needed)):
+            found = report(*words, "--sweeps", most)
+            done = [one for one in found["sweeps"] if one["sweep"] and "smoothing" not in one["phase"]]  # type: ignore[attr-defined]
+            assert len(done) <= most
+            assert found["inverted"] <= found["sweeps"][0]["inverted"]  # type: ignore[index]
+            if most == 0 and source == nodes:
+                assert (tmp_path / "out.vtu").read_bytes() == source.read_bytes()
+
+
 def test_perturbed_and_mended(tmp_path: Path) -> None:
     source = box(tmp_path / "in.vtu", bend=0.05, size=0.05)
     run("perturb", "--percent", "20", "--dist", "1h", source, tmp_path / "bad.vtu")

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from meshfix_cli.solve.team import Team
 
 GAIN = 0.01  # degrees: a valid mesh of which "best" makes no more than that is left alone, and it may lose no more
+AREA_KEPT = 0.5  # of the smallest area of a surface: where all are as small, none could move else
 ANGLE_STEPS = 2.0**32  # of a radian
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -73,7 +74,8 @@ class Positions:
         self.best: Start | None = self.first
         self.count = self.team.total(int(self.own.sum()))  # of what can be mended, in all processes
         # A valid mesh keeps its smallest measure; in others those of the inverted elements were worse.
-        self.min_measure = -math.inf if self.record.inverted else self.measure
+        kept = self.measure if mesh.surface is None else AREA_KEPT * self.measure
+        self.min_measure = -math.inf if self.record.inverted else kept
         self.floor = self.min_measure
 
     @property

@@ -39,6 +39,7 @@ GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIE
 GOAL_PATIENCE = 2
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+LET_DOWN = 0.8  # of the smallest angle of a surface, to which the first of these may take it
 SURFACE_SWEEPS = 20  # for the mean ratios, where a plane or solid mesh has one energy of all elements
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
 
@@ -291,7 +292,8 @@ class Run(Positions):
         smallest = self._least(self._angles(self.points))
         self.kept = self.points, self.record, smallest
         near, points = self._smoothed(phase) & self.team.own_vertices, self.points
-        states, floor = _due(near), math.sin(min(smallest, math.pi / 2)) ** 2
+        held = smallest if phase.shapes != "first" else LET_DOWN * smallest  # what is jointly stuck there comes free
+        states, floor = _due(near), math.sin(min(held, math.pi / 2)) ** 2
         for _ in range(SURFACE_SWEEPS):
             points = self._relocated(points, Move.MEAN_RATIO, states, floor)
         yield points

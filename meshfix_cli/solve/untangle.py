@@ -131,7 +131,8 @@ def steps(
         yield run.mesh, run.record
     first, last = run.first[1], run.record
     # What was compared is no worse than the default in its scaled Jacobians, which tell more than the smallest measure.
-    worse = last.rank > first.rank if run.compared is None else last.inverted > first.inverted
+    by_measure = run.compared is None and mesh.surface is None
+    worse = last.rank > first.rank if by_measure else last.inverted > first.inverted
     lost = worse or (to_the_ceiling and first.inverted == 0 and not run.gained())
     if lost and run.go_back(untangling=False):
         yield run.mesh, run.record

@@ -19,7 +19,7 @@ from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, rea
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
     from meshfix_cli.mesh.quadratic import Judgement, Quadratic
-    from meshfix_cli.mesh.surface import Surface
+    from meshfix_cli.mesh.sides import Surface
 
 _T = TypeVar("_T", bound=np.generic)
 
@@ -105,9 +105,10 @@ class Mesh:
         mesh = cls(read_only(p), topology, read_only(movable))
         if p.shape[1] == topology.dimension:
             return mesh
-        from meshfix_cli.mesh.surface import seen
+        from meshfix_cli.mesh.sides import Surface, normals_seen
 
-        return seen(mesh, threads)
+        normals = normals_seen(topology, mesh.along_curve(mesh.points), threads)
+        return replace(mesh, surface=Surface(read_only(normals)))
 
     @property
     def dimension(self) -> int:

@@ -349,7 +349,7 @@ def _ends(mesh: Mesh) -> dict[str, NDArray[np.bool_]]:
     topology = mesh.topology
     if mesh.surface is None:
         return {ON_BOUNDARY: topology.boundary}
-    from meshfix_cli.mesh.surface import crowded_edges
+    from meshfix_cli.mesh.sides import crowded_edges
 
     edges, counts = crowded_edges(topology), np.zeros(len(topology.connectivity.vertices), dtype=bool)
     counts[edges] = True

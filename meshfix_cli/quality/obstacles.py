@@ -113,7 +113,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
 
 def crossings_of_surface(mesh: Mesh, threads: int = 1) -> int:
     """Count the pairs of elements of a surface that cross each other, of each element the first 16."""
-    from meshfix_cli.mesh.surface import facets_of
+    from meshfix_cli.mesh.sides import facets_of
 
     facets = facets_of(mesh.topology)
     triangles = facets[:, :3]

@@ -179,7 +179,7 @@ def _summarise_simplices(mesh: Mesh, threads: int) -> Summary:
 
 def _summarise_surface(mesh: Mesh, metrics: Sequence[str], threads: int) -> Summary:
     """Evaluate a surface: its elements one by one in their planes, and the edges at which one is turned over."""
-    from meshfix_cli.mesh.surface import joined_elements
+    from meshfix_cli.mesh.sides import joined_elements
 
     summary = summarise(mesh.unfolded(threads), metrics, threads)
     wrong = np.zeros(mesh.topology.m, dtype=bool)
@@ -340,7 +340,7 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
     return {"mean": float(moved.mean()) if len(moved) else 0.0, "largest": float(far.max()), "vertices": len(moved)}
 
 
-def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, float | None]:
+def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, float]:
     """Measure how a boundary that slides on curves and surfaces has changed.
 
     Parameters
@@ -364,7 +364,7 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
     points, there = before.along_curve(before.points), after.along_curve(after.points)
     facets, encloses = after.topology.facets_between(None)[0], True
     if after.surface is not None:
-        from meshfix_cli.mesh.surface import facets_of, is_closed
+        from meshfix_cli.mesh.sides import facets_of, is_closed
 
         facets, encloses = facets_of(after.topology), is_closed(after.topology)
     (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
@@ -375,7 +375,7 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
         "bound": shapes.bound,
         "beyond": int((deviations > shapes.bound * WITHIN).sum()),
         "folds": shapes.folds,
-        "size": _change(size, new_size) if encloses else None,
+        **({"size": _change(size, new_size)} if encloses else {}),
         "boundary": _change(boundary, new_boundary),
     }
 

@@ -24,7 +24,7 @@ def sliding(report: Report) -> Iterator[str]:
 def _changed(shape: Mapping[str, Any], mesh: Mesh) -> Iterator[str]:
     solid, what = mesh.points.shape[1] == 3, "boundary" if mesh.surface is None else "surface"
     size, boundary = ("volume", "area") if solid else ("area", "length")
-    within = "" if shape["size"] is None else f", the {size} by {shape['size']:.2g}"
+    within = f", the {size} by {shape['size']:.2g}" if "size" in shape else ""
     yield (
         f"the {what} is within {shape['hausdorff']:.3g} of its shape (Hausdorff distance), its {boundary} changed by "
         f"{shape['boundary']:.2g} of itself{within}"

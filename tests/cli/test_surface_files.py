@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -14,10 +15,10 @@ from surfaces import box, moebius, tangled, three_sheets, torus
 from meshfix_cli import read
 from meshfix_cli.cli import main
 
-SUFFIXES = (".obj", ".off", ".ply", ".stl", ".vtk", ".vtu", ".msh", ".inp", ".bdf", ".mesh")
+SUFFIXES = (".obj", ".off", ".ply", ".stl", ".vtk", ".vtu", ".msh", ".inp", ".mesh")
 
 
-def run(*args: object) -> dict[str, object]:
+def run(*args: object) -> dict[str, Any]:
     """Run a command that ends well, or with elements left, and return its report."""
     result = CliRunner().invoke(main, [*map(str, args), "--json"], catch_exceptions=False)
     assert result.exit_code in (0, 3), result.output
@@ -39,7 +40,7 @@ def test_every_format_of_surfaces_is_solved_and_written_back(suffix: str, tmp_pa
     after = tmp_path / f"out{suffix}"
     report = run("untangle", before, after)
     stages = report["quality"]
-    assert report["valid"] and report["surface"] and isinstance(stages, dict)
+    assert report["valid"] and report["surface"]
     assert stages["smoothed"]["percentile_1"] > stages["before"]["percentile_1"]
     here, there = read(before), read(after)
     np.testing.assert_array_equal(here.mesh.topology.simplices, there.mesh.topology.simplices)

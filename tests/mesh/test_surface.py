@@ -8,7 +8,8 @@ from surfaces import box, bumps, laid, moebius, three_sheets, torus
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.mesh.surface import crowded_edges, inward, is_closed
+from meshfix_cli.mesh.sides import crowded_edges, is_closed
+from meshfix_cli.mesh.surface import inward
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.metrics import METRICS
 from meshfix_cli.quality.summary import summarise

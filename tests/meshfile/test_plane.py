@@ -24,6 +24,7 @@ def test_a_vertex_far_away_in_the_plane_does_not_tilt_it(far: float, random: np.
         points, normal = in_space(random)
         points[7] += far * (points[8] - points[9])
         basis = plane_basis(points)
+        assert basis is not None
         np.testing.assert_allclose(basis @ basis.T, np.eye(2), atol=1e-14)
         assert np.abs(basis @ normal).max() < 1e-9
 
@@ -40,7 +41,8 @@ def test_what_is_not_flat_is_not_hidden_by_a_vertex_far_away(far: float, random:
 def test_a_plane_along_the_axes_has_their_bits(random: np.random.Generator) -> None:
     points = np.column_stack([random.random((50, 2)), np.full(50, 0.1)])
     points[3, 0] = 1e7
-    assert plane_basis(points).tolist() == [[1, 0, 0], [0, 1, 0]]
+    basis = plane_basis(points)
+    assert basis is not None and basis.tolist() == [[1, 0, 0], [0, 1, 0]]
 
 
 def test_coordinates_that_cannot_be_computed_with_are_refused_before_a_plane_is_looked_for(tmp_path: Path) -> None:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
-from surfaces import box, bumps, height, laid, off_torus, tangled, torus
+from surfaces import Array, Rows, box, bumps, height, laid, off_torus, tangled, torus
 
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.summary import change_of_shape, summarise
+from meshfix_cli.solve.strategies import Smooth
 from meshfix_cli.solve.untangle import untangle
+
+BODIES: dict[str, Callable[[], tuple[Array, Rows]]] = {
+    "torus": torus, "quads": lambda: torus(quads=True), "bumps": bumps, "box": box,
+}  # fmt: skip
 
 
 def test_smoothing_keeps_to_the_surface_and_raises_the_angles() -> None:
     points, rows = torus(jitter=0.3)
     mesh = laid(points, rows)
-    for smooth, least in (("auto", 20), ("best", 22)):
+    levels: tuple[tuple[Smooth, float], ...] = (("auto", 20), ("best", 22))
+    for smooth, least in levels:
         outcome = untangle(mesh, smooth=smooth)
         before, after = summarise(mesh), summarise(outcome.after)
         assert outcome.valid and after.min_angle > max(least, before.min_angle)
@@ -27,9 +35,9 @@ def test_smoothing_keeps_to_the_surface_and_raises_the_angles() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("body", ["torus", "quads", "bumps", "box"])
+@pytest.mark.parametrize("body", BODIES)
 def test_what_is_tangled_along_a_surface_is_untangled_with_a_reference(body: str, seed: int) -> None:
-    points, rows = {"torus": torus, "quads": lambda: torus(quads=True), "bumps": bumps, "box": box}[body]()
+    points, rows = BODIES[body]()
     mesh = laid(tangled(points, rows, seed), rows, reference=points)
     assert mesh.check()[0] > len(rows) / 20
     outcome = untangle(mesh)
@@ -44,7 +52,7 @@ def test_what_is_tangled_along_a_surface_is_untangled_with_a_reference(body: str
 
 @pytest.mark.parametrize("body", ["torus", "bumps"])
 def test_without_a_reference_the_points_tell_the_surface(body: str) -> None:
-    points, rows = {"torus": torus, "bumps": bumps}[body]()
+    points, rows = BODIES[body]()
     folded = tangled(points, rows)
     outcome = untangle(Mesh.build(folded, rows))
     after = outcome.after.points

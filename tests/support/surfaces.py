@@ -98,7 +98,8 @@ def moebius(n: int = 24, wide: int = 3) -> tuple[Array, Rows]:
 def three_sheets(n: int = 4) -> tuple[Array, Rows]:
     """Return three flat sheets of n x n quadrilaterals that meet in one edge, along z."""
     number: dict[tuple[int, int, int], int] = {}
-    points, rows = [], []
+    points: list[Array] = []
+    rows = []
     for sheet in range(3):
         way = np.array([np.cos(2.1 * sheet), np.sin(2.1 * sheet), 0.0])
         for i in range(n):

@@ -1,0 +1,151 @@
+"""From which side the elements of a surface in space are seen, and what is known of it by its topology alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.topology import Topology
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.curved import Smooth
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Numbers = NDArray[np.int32]
+RINGS = 1  # of neighbours whose stars give a vertex its normal, where elements are turned over
+
+
+@dataclass(frozen=True, eq=False)
+class Kept:
+    """What of a surface keeps its shape, beside its curvature.
+
+    Attributes
+    ----------
+    labels : (m,) int64
+        Elements, in the order of the connectivity, of different labels belong to different patches.
+    lines : (l, 2) int32
+        Edges that end patches, too, in the numbers of the connectivity.
+    held : (k,) bool
+        Vertices of the connectivity that never move.
+    smooth : Smooth
+        What counts as smooth, and how exactly it is kept.
+    slide : {"none", "flat", "curved"}
+        Whether vertices move along the straight ones, or all, of features and boundaries.
+    """
+
+    labels: NDArray[np.int64]
+    lines: Numbers
+    held: Mask
+    smooth: Smooth
+    slide: Literal["none", "flat", "curved"]
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """What is known of a surface beside its topology.
+
+    Attributes
+    ----------
+    normals : (m, 3) float64
+        Of the side from which each element, in the order of the connectivity, is seen: what turns away from it is
+        inverted.
+    kept : Kept or None
+        None: nobody has told yet.
+    has_reference : bool
+        The normals, and where vertices slide, are those of a reference.
+    """
+
+    normals: Array
+    kept: Kept | None = None
+    has_reference: bool = False
+
+
+def normals_seen(topology: Topology, points: Array, threads: int) -> Array:
+    """Return unit normals (m, 3) of the side to which most of a surface turns, its vertices at points (k, 3).
+
+    An element has its own. Where elements turn by more than a right angle against their neighbours, those that do so
+    together are turned over if what is around them tells so: the area of the stars around as a vector, which does not
+    depend on where their inner vertices are.
+    """
+    areas = kernels.area_vectors(points, *rows_of_elements(topology), threads)
+    own, pairs = unit(areas), joined_elements(topology)
+    turned = (own[pairs[:, 0]] * own[pairs[:, 1]]).sum(axis=1) < 0
+    flat = ~(own != 0).any(axis=1)
+    if not (turned.any() or flat.any()):
+        return own
+    by_stars = unit(around(topology, areas)[1])
+    patch = kernels.joined(np.ascontiguousarray(pairs[~turned]), len(own))
+    votes = np.bincount(patch, (areas * by_stars).sum(axis=1), len(own))[patch]
+    normals = np.where(((votes < 0) | flat)[:, None], by_stars, own)
+    normals[~(normals != 0).any(axis=1), 2] = 1.0
+    return normals
+
+
+def around(topology: Topology, areas: Array) -> tuple[Array, Array]:
+    """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3)."""
+    offsets, nodes = rows_of_elements(topology)
+    owners, k = np.repeat(np.arange(len(areas)), np.diff(offsets)), len(topology.connectivity.vertices)
+    of_stars = _summed(nodes, areas[owners], k)
+    start, end = topology.edges()
+    for _ in range(RINGS):
+        of_stars = of_stars + _summed(start, of_stars[end], k) + _summed(end, of_stars[start], k)
+    return of_stars, np.add.reduceat(of_stars[nodes], offsets[:-1])
+
+
+def _summed(place: Numbers, values: Array, count: int) -> Array:
+    return np.stack([np.bincount(place, column, count) for column in values.T], axis=1)
+
+
+def unit(vectors: Array) -> Array:
+    """Return vectors (n, d) of the length 1; those without a length stay."""
+    length = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def rows_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:
+    """Return the offsets (m+1,) of the elements of a connectivity and their nodes, one behind the other."""
+    mesh = topology.connectivity
+    if mesh.simplicial:
+        return np.arange(0, mesh.simplices.size + 1, 3, dtype=np.int32), mesh.simplices.ravel()
+    return mesh.node_offsets, mesh.nodes
+
+
+def joined_elements(topology: Topology) -> Numbers:
+    """Return the pairs (p, 2) of elements, by their rows in the connectivity, that have an edge in common."""
+    mesh = topology.connectivity
+    if mesh.simplicial:
+        mates = mesh.mates.ravel()
+        here = np.flatnonzero(mates > np.arange(len(mates)))
+        return np.stack([here // 3, mates[here] // 3], axis=1).astype(np.int32)
+    mates = mesh.facet_mates
+    here = np.flatnonzero(mates > np.arange(len(mates)))
+    return np.stack([mesh.facet_owners[here], mesh.facet_owners[mates[here]]], axis=1)
+
+
+def facets_of(topology: Topology) -> Numbers:
+    """Return the elements (m, 3 or 4) as facets in space; -1: no more vertices."""
+    mesh = topology.connectivity
+    if mesh.simplicial:
+        return mesh.simplices
+    counts = np.diff(mesh.node_offsets)
+    facets = np.full((len(counts), int(counts.max())), -1, dtype=np.int32)
+    facets[np.arange(facets.shape[1]) < counts[:, None]] = mesh.nodes
+    return facets
+
+
+def is_closed(topology: Topology) -> bool:
+    """Whether a surface encloses something: each edge is of two elements, and these are numbered alike."""
+    mesh = topology.connectivity
+    mates = mesh.mates if mesh.simplicial else mesh.facet_mates
+    return bool((mates >= 0).all()) and mesh.orientable
+
+
+def crowded_edges(topology: Topology) -> Numbers:
+    """Return the edges (e, 2), in the numbers of the connectivity, of more than two elements."""
+    edges, count = np.unique(np.sort(topology.facets_between(None)[0], axis=1), axis=0, return_counts=True)
+    return edges[count > 2]

@@ -78,7 +78,8 @@ class Held:
 
         reference = replace(self, fix=(), regions=None, input_format=None).read(source, threads)
         with naming(f"{source}: as a reference"):
-            points = reference_points(document.mesh, reference.mesh, threads)
+            places = reference.source.points.astype("f8") if document.mesh.surface is not None else None
+            points = reference_points(document.mesh, reference.mesh, threads, places)
             alike = reference.seen_from(document)
             return points if alike is None else document.mesh.along_curve(alike)
 

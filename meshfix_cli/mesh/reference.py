@@ -10,8 +10,12 @@ from meshfix_cli.mesh.elements import JUDGED, Shape, counted
 from meshfix_cli.mesh.mesh import Mesh
 
 
-def reference_points(mesh: Mesh, reference: Mesh, threads: int = 1) -> NDArray[np.float64]:
+def reference_points(
+    mesh: Mesh, reference: Mesh, threads: int = 1, positions: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
     """Return the positions of a valid mesh that has the same elements with the same numbers.
+
+    `positions` (n, d): where its points are in space, if it is a plane one and the mesh a surface.
 
     Returns
     -------
@@ -21,8 +25,8 @@ def reference_points(mesh: Mesh, reference: Mesh, threads: int = 1) -> NDArray[n
     Raises
     ------
     InvalidMeshError
-        The numbers of points or elements differ, an element has other vertices or joins them otherwise, or one of the
-        reference is inverted.
+        The numbers of points or elements differ, an element has other vertices or joins them otherwise, one of the
+        reference is inverted, or one of the two lies in a plane and the other does not.
     """
     shape = mesh.topology.element.shape
     ours, theirs = _counts(mesh), _counts(reference)
@@ -35,7 +39,10 @@ def reference_points(mesh: Mesh, reference: Mesh, threads: int = 1) -> NDArray[n
     inverted = reference.check(threads)[0]
     if inverted:
         raise InvalidMeshError(f"{counted(inverted, f'{shape.name} of it is', f'{shape.plural} of it are')} inverted")
-    return mesh.along_curve(reference.points)
+    points = reference.points if positions is None else positions
+    if points.shape[1] != mesh.points.shape[1]:
+        raise InvalidMeshError("of it and the mesh, one lies in a plane and the other is a surface")
+    return mesh.along_curve(points)
 
 
 def _counts(mesh: Mesh) -> str:

@@ -10,7 +10,7 @@ import meshio
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from surfaces import box, moebius, tangled, three_sheets, torus
+from surfaces import box, bumps, moebius, tangled, three_sheets, torus
 
 from meshfix_cli import read
 from meshfix_cli.cli import main
@@ -109,3 +109,12 @@ def test_pages_and_cells_of_surfaces(tmp_path: Path) -> None:
         assert "Three-dimensional view" in page.read_text()
         name = "scaled_jacobian" if quads else "min_angle"
         assert len(meshio.read(cells).cell_data[name][0]) > 200
+
+
+def test_a_plane_reference_lies_in_space_and_a_bent_one_is_none_of_a_plane(tmp_path: Path) -> None:
+    points, rows = bumps()
+    bent, flat = save(tmp_path / "bent.vtk", 0.01 * points * [100, 100, 1], rows), points * [1, 1, 0]
+    plane = save(tmp_path / "plane.vtk", flat, rows)
+    assert run("untangle", "--reference", plane, bent, tmp_path / "out.vtk")["valid"]
+    found = CliRunner().invoke(main, ["untangle", "--reference", str(bent), str(plane), str(tmp_path / "out.vtk")])
+    assert found.exit_code == 1 and "one lies in a plane and the other is a surface" in found.stderr

@@ -26,7 +26,6 @@ from splicing import FORMATS, MODULES
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import MeshfixError
-from meshfix_cli.mesh.judged import Judged
 
 # Hypothesis warns of its own account of large files, which becomes an error here and hides what it found.
 pytestmark = pytest.mark.filterwarnings("ignore:Generating overly large repr")
@@ -115,9 +114,11 @@ def check(path: Path, data: bytes) -> None:
         assert time.monotonic() - start < SECONDS
     again = read(target)
     for mesh in (document.mesh, again.mesh):
-        sizes = Judged(mesh.topology.connectivity).judge(mesh.along_curve(mesh.points), 1)[1]
+        sizes = mesh.judged().judge(mesh.along_curve(mesh.points), 1)[1]
         if abs(sizes.sum()) < 1e-9 * np.abs(sizes).sum():
             return  # a vertex so far away that rounding tells which orientation is the positive one
+    if document.mesh.surface is not None:
+        return  # the sides of a folded surface are found anew
     inverted, smallest = again.mesh.check()
     assert inverted == result.check()[0]
     if document.basis is None:  # else the plane of a flat mesh is found anew

@@ -268,9 +268,8 @@ _SLIDE = (
         default="none",
         show_default=True,
         help="Let vertices of the boundary, or at the edges of a surface, move where that does not change the shape. "
-        "flat: in planes and on straight "
-        "edges; corners and what is curved stay. curved: on smooth surfaces and along their edges as well, which "
-        "changes the shape a little.",
+        "flat: in planes and on straight edges; corners and what is curved stay. curved: on smooth surfaces and along "
+        "their edges as well, which changes the shape a little.",
     ),
     click.option(
         "--feature-angle",

@@ -19,7 +19,6 @@ def relocate_on_surface(
     points: Float64,
     states: NDArray[np.uint8],
     mesh: Connectivity,
-    normals: Float64,
     blocks: Int32,
     threshold_sine2: float,
     min_measure: float,
@@ -27,5 +26,6 @@ def relocate_on_surface(
     max_move: float,
     threads: int,
     freedom: Freedom,
+    normals: Float64,
 ) -> tuple[int, int]:
-    """As `relocate`, with the vertices in the planes, on the lines, surfaces and curves of a freedom."""
+    """As `relocate`, in the planes, and on the lines, surfaces and curves of a freedom; seen from normals (m, 3)."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.patches import Constraints, Joints, normals_of, numbered, of_two
+from meshfix_cli.mesh.patches import Constraints, Joints, normals_of, numbered, of_two, summed, unit_vectors
 from meshfix_cli.mesh.topology import rows_of_part
 
 Array = NDArray[np.float64]
@@ -172,7 +172,7 @@ class _Shaped:
 
     def __init__(self, points: Array, given: Constraints, smooth: Smooth) -> None:
         self.points, self.given, self.smooth = points, given, smooth
-        self.units = _unit(normals_of(points, given.facets, 0.0)[0]) if given.normals is None else given.normals
+        self.units = unit_vectors(normals_of(points, given.facets, 0.0)[0]) if given.normals is None else given.normals
         self.folds = 0
 
     def meet_smoothly(self, pairs: Numbers) -> Mask:
@@ -193,9 +193,9 @@ class _Shaped:
         known = np.zeros_like(self.points)
         there = self.points[edges[pairs].sum(axis=2) - vertices[:, None]] - self.points[vertices][:, None]
         length = np.linalg.norm(there, axis=2, keepdims=True)
-        unit = _unit(there)
-        known[vertices] = _unit(unit[:, 1] * length[:, 0] - unit[:, 0] * length[:, 1])
-        along = _unit(ways)
+        unit = unit_vectors(there)
+        known[vertices] = unit_vectors(unit[:, 1] * length[:, 0] - unit[:, 0] * length[:, 1])
+        along = unit_vectors(ways)
         tangents = known[edges]
         tangents *= np.where((tangents * along[:, None]).sum(axis=2) < 0, -1.0, 1.0)[:, :, None]
         ends = ~(tangents != 0).any(axis=2)
@@ -249,7 +249,7 @@ class _Solid(_Shaped):
         """The features (e, 2), the vertices (v,) at which two go on in each other, and these (v, 2)."""
         features = self.joints.edges[self.is_feature]
         vertices, pairs, ways = self.around.passed(self.points, features, self.joints.count[self.is_feature])
-        unit = _unit(ways)
+        unit = unit_vectors(ways)
         good = -(unit[:, 0] * unit[:, 1]).sum(axis=1) >= self.smooth.cosine
         return features, vertices[good], pairs[good]
 
@@ -305,10 +305,10 @@ class _Solid(_Shaped):
         rows, places = np.nonzero(facets >= 0)
         width = (facets >= 0).sum(axis=1)[rows]
         here = self.points[facets[rows, places]]
-        one, other = (_unit(self.points[facets[rows, (places + step) % width]] - here) for step in (1, -1))
+        one, other = (unit_vectors(self.points[facets[rows, (places + step) % width]] - here) for step in (1, -1))
         angle = kernels.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
         weighted, fan = angle[:, None] * self.units[rows], self.around.fan
-        return _unit(np.stack([np.bincount(fan, column, len(fan)) for column in weighted.T], axis=1))
+        return unit_vectors(summed(fan, weighted, len(fan)))
 
 
 def _both_ways(edges: Numbers) -> Numbers:
@@ -319,11 +319,6 @@ def _around(vertices: Numbers, shape: Numbers, piece: Places) -> Numbers:
     """Return rows (r, 5): a vertex and the others, -1: there is no third, the shape and the piece that they make."""
     third = [] if vertices.shape[1] == 3 else [np.full(len(vertices), -1)]
     return np.column_stack([vertices, *third, shape, piece]).astype(np.int32)
-
-
-def _unit(vectors: Array) -> Array:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def _curved(

@@ -193,14 +193,14 @@ class _Surface:
 
     def _ratio(self, group: Numbers, facets: Numbers, count: int) -> Array:
         """Return |sum of normals| / sum of areas of groups (count,) of facets; 1 where there is no area."""
-        sums = np.stack([np.bincount(group, column, count) for column in self.normals[facets].T], axis=1)
+        sums = summed(group, self.normals[facets], count)
         total = np.bincount(group, self.areas[facets], count)
         return np.divide(np.linalg.norm(sums, axis=1), total, out=np.ones(count), where=total > 0)
 
     def _tangled(self, patch: Numbers) -> Mask:
         """(f,) bool, by the number of a patch: facets are turned over in it, and only such of inverted elements."""
         count = len(patch)
-        sums = np.stack([np.bincount(patch, column, count) for column in self.normals.T], axis=1)
+        sums = summed(patch, self.normals, count)
         over = (self.normals * sums[patch]).sum(axis=1) < 0
         by_itself = np.bincount(patch, over & ~self.given.inverted, count) > 0
         return ~by_itself & (np.linalg.norm(sums, axis=1) > SLIT * np.bincount(patch, self.areas, count))
@@ -221,6 +221,17 @@ def normals_of(points: Array, facets: Numbers, tolerance: float) -> tuple[Array,
     gap = np.abs((normals * (p[:, 1] - p[:, 0])).sum(axis=1))
     size = np.maximum((one**2).sum(axis=1), (other**2).sum(axis=1)) ** 1.5
     return normals, gap > tolerance * size
+
+
+def unit_vectors(vectors: Array) -> Array:
+    """Return vectors (..., d) of the length 1; those without a length stay."""
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
+
+
+def summed(group: Places, vectors: Array, count: int) -> Array:
+    """Return the sums (count, d) of vectors (x, d) by their groups (x,)."""
+    return np.stack([np.bincount(group, column, count) for column in vectors.T], axis=1)
 
 
 def _sine(one: Array, other: Array) -> Array:

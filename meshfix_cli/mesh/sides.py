@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.patches import summed, unit_vectors
 from meshfix_cli.mesh.topology import Topology
 
 if TYPE_CHECKING:
@@ -73,12 +74,12 @@ def normals_seen(topology: Topology, points: Array, threads: int) -> Array:
     depend on where their inner vertices are.
     """
     areas = kernels.area_vectors(points, *rows_of_elements(topology), threads)
-    own, pairs = unit(areas), joined_elements(topology)
+    own, pairs = unit_vectors(areas), joined_elements(topology)
     turned = (own[pairs[:, 0]] * own[pairs[:, 1]]).sum(axis=1) < 0
     flat = ~(own != 0).any(axis=1)
     if not (turned.any() or flat.any()):
         return own
-    by_stars = unit(around(topology, areas)[1])
+    by_stars = unit_vectors(around(topology, areas)[1])
     patch = kernels.joined(np.ascontiguousarray(pairs[~turned]), len(own))
     votes = np.bincount(patch, (areas * by_stars).sum(axis=1), len(own))[patch]
     normals = np.where(((votes < 0) | flat)[:, None], by_stars, own)
@@ -90,21 +91,11 @@ def around(topology: Topology, areas: Array) -> tuple[Array, Array]:
     """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3)."""
     offsets, nodes = rows_of_elements(topology)
     owners, k = np.repeat(np.arange(len(areas)), np.diff(offsets)), len(topology.connectivity.vertices)
-    of_stars = _summed(nodes, areas[owners], k)
+    of_stars = summed(nodes, areas[owners], k)
     start, end = topology.edges()
     for _ in range(RINGS):
-        of_stars = of_stars + _summed(start, of_stars[end], k) + _summed(end, of_stars[start], k)
+        of_stars = of_stars + summed(start, of_stars[end], k) + summed(end, of_stars[start], k)
     return of_stars, np.add.reduceat(of_stars[nodes], offsets[:-1])
-
-
-def _summed(place: Numbers, values: Array, count: int) -> Array:
-    return np.stack([np.bincount(place, column, count) for column in values.T], axis=1)
-
-
-def unit(vectors: Array) -> Array:
-    """Return vectors (n, d) of the length 1; those without a length stay."""
-    length = np.linalg.norm(vectors, axis=1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
 
 
 def rows_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:
@@ -115,16 +106,19 @@ def rows_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:
     return mesh.node_offsets, mesh.nodes
 
 
-def joined_elements(topology: Topology) -> Numbers:
-    """Return the pairs (p, 2) of elements, by their rows in the connectivity, that have an edge in common."""
+def edges_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:
+    """Return the element (f,) of each edge, by its row in the connectivity, and that across it; -1: there is none."""
     mesh = topology.connectivity
     if mesh.simplicial:
-        mates = mesh.mates.ravel()
-        here = np.flatnonzero(mates > np.arange(len(mates)))
-        return np.stack([here // 3, mates[here] // 3], axis=1).astype(np.int32)
-    mates = mesh.facet_mates
-    here = np.flatnonzero(mates > np.arange(len(mates)))
-    return np.stack([mesh.facet_owners[here], mesh.facet_owners[mates[here]]], axis=1)
+        return np.repeat(np.arange(topology.m, dtype=np.int32), 3), mesh.mates.ravel() // 3
+    return mesh.facet_owners, np.where(mesh.facet_mates < 0, -1, mesh.facet_owners[mesh.facet_mates])
+
+
+def joined_elements(topology: Topology) -> Numbers:
+    """Return the pairs (p, 2) of elements, by their rows in the connectivity, that have an edge in common."""
+    here, there = edges_of_elements(topology)
+    once = there > here
+    return np.stack([here[once], there[once]], axis=1)
 
 
 def facets_of(topology: Topology) -> Numbers:
@@ -140,9 +134,14 @@ def facets_of(topology: Topology) -> Numbers:
 
 def is_closed(topology: Topology) -> bool:
     """Whether a surface encloses something: each edge is of two elements, and these are numbered alike."""
-    mesh = topology.connectivity
-    mates = mesh.mates if mesh.simplicial else mesh.facet_mates
-    return bool((mates >= 0).all()) and mesh.orientable
+    return bool((edges_of_elements(topology)[1] >= 0).all()) and topology.connectivity.orientable
+
+
+def frames_of(normals: Array) -> Array:
+    """Return orthonormal rows (k, 3, 3) of which the last are unit normals (k, 3)."""
+    least = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    along = unit_vectors(np.cross(least, normals))
+    return np.stack([along, np.cross(normals, along), normals], axis=1)
 
 
 def crowded_edges(topology: Topology) -> Numbers:

@@ -14,8 +14,17 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.freedom import Freedom, freedom_of
-from meshfix_cli.mesh.patches import Constraints
-from meshfix_cli.mesh.sides import Kept, Surface, around, facets_of, normals_seen, rows_of_elements, unit
+from meshfix_cli.mesh.patches import Constraints, unit_vectors
+from meshfix_cli.mesh.sides import (
+    Kept,
+    Surface,
+    around,
+    edges_of_elements,
+    facets_of,
+    frames_of,
+    normals_seen,
+    rows_of_elements,
+)
 from meshfix_cli.mesh.topology import read_only
 
 if TYPE_CHECKING:
@@ -107,16 +116,11 @@ def inward(mesh: Mesh) -> Mask:
     connectivity, points = topology.connectivity, mesh.along_curve(mesh.points)
     if not connectivity.orientable:
         return found
-    open_parts = np.zeros(len(found), dtype=bool)
-    if connectivity.simplicial:
-        open_parts[(connectivity.mates < 0).any(axis=1)] = True
-    else:
-        open_parts[connectivity.facet_owners[connectivity.facet_mates < 0]] = True
-    part = connectivity.component
+    part, (here, there) = connectivity.component, edges_of_elements(topology)
     areas = kernels.area_vectors(points, *rows_of_elements(topology), 1)
     middles = topology.centroids(points - points[0], np.arange(topology.m))
     volumes = np.bincount(part, (areas * middles).sum(axis=1))
-    is_open = np.bincount(part, open_parts) > 0
+    is_open = np.bincount(part[here], there < 0) > 0
     found[connectivity.rows] = ((volumes < 0) & ~is_open)[part]
     return found
 
@@ -135,9 +139,7 @@ def in_planes(mesh: Mesh, region: Mask, threads: int = 1) -> Mesh:
     topology, points = mesh.topology, mesh.along_curve(mesh.points)
     assert mesh.surface is not None and mesh.surface.kept is not None
     of_vertices, of_elements = _seen_around(mesh, threads)
-    least = np.eye(3)[np.abs(of_vertices).argmin(axis=1)]
-    along = unit(np.cross(least, of_vertices))
-    axes = np.stack([along, np.cross(of_vertices, along), of_vertices], axis=1)
+    axes = frames_of(of_vertices)
     assert mesh.freedom is not None
     flat = (mesh.freedom.degrees == 2) & ~mesh.freedom.curved
     axes[flat] = mesh.freedom.axes[mesh.freedom.frame[flat]]
@@ -160,7 +162,7 @@ def _seen_around(mesh: Mesh, threads: int) -> tuple[Array, Array]:
     """Return the unit normals that vertices (k, 3) and elements (m, 3) have by what is around them."""
     areas = kernels.area_vectors(mesh.along_curve(mesh.points), *rows_of_elements(mesh.topology), threads)
     of_vertices, of_elements = around(mesh.topology, areas)
-    return unit(of_vertices), unit(of_elements)
+    return unit_vectors(of_vertices), unit_vectors(of_elements)
 
 
 def tangled(mesh: Mesh, threads: int = 1) -> Mask:

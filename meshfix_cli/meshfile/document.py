@@ -351,9 +351,9 @@ def _ends(mesh: Mesh) -> dict[str, NDArray[np.bool_]]:
         return {ON_BOUNDARY: topology.boundary}
     from meshfix_cli.mesh.sides import crowded_edges
 
-    edges, counts = crowded_edges(topology), np.zeros(len(topology.connectivity.vertices), dtype=bool)
-    counts[edges] = True
-    crowded = topology.of_vertices(counts)
+    marked = np.zeros(len(topology.connectivity.vertices), dtype=bool)
+    marked[crowded_edges(topology)] = True
+    crowded = topology.of_vertices(marked)
     ends = {ON_BOUNDARY: topology.boundary & ~crowded}
     return {**ends, CROWDED: crowded} if crowded.any() else ends
 

@@ -161,22 +161,17 @@ class Positions:
         """Return the points (k, d) after a sweep, which keeps account in `states`; the threshold is the user's."""
         threshold_sine2 = self.threshold_sine2 if threshold_sine2 is None else threshold_sine2
         points = points.copy()
-        if self.surface is not None:
-            return self._on_surface(points, move, states, threshold_sine2)
+        freedom = None if self.freedom is None else self.freedom.kernel
         for blocks in self.team.sweep(points, states):
-            kernels.relocate(
+            given = (
                 move, points, states, self.stars, blocks, threshold_sine2, self.floor, self.first[0], self.max_move,
-                self.threads, None if self.freedom is None else self.freedom.kernel,
+                self.threads,
             )  # fmt: skip
-        return points
-
-    def _on_surface(self, points: Array, move: Move, states: NDArray[np.uint8], threshold_sine2: float) -> Array:
-        assert self.surface is not None and self.freedom is not None
-        for blocks in self.team.sweep(points, states):
-            kernels.relocate_on_surface(
-                move, points, states, self.stars, self.surface.normals, blocks, threshold_sine2, self.floor,
-                self.first[0], self.max_move, self.threads, self.freedom.kernel,
-            )  # fmt: skip
+            if self.surface is None:
+                kernels.relocate(*given, freedom)
+            else:
+                assert freedom is not None
+                kernels.relocate_on_surface(*given, freedom, self.surface.normals)
         return points
 
     def _min_sine2(self, elements: Judged) -> float:

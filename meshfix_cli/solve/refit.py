@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.mesh.sides import frames_of
+
 Array = NDArray[np.float64]
 NEAREST = 16  # points to which a quadric with its 6 coefficients is fitted
 SMOOTH = 0.1  # of their size: of what is no quadric to this, such as an edge, nothing is told
@@ -36,11 +38,7 @@ def refitted(points: Array, rows: NDArray[np.integer], normals: Array, sample: A
         return points
     here, up = points[rows], normals[rows]
     _, near = cKDTree(sample).query(here, count)
-    least = np.eye(3)[np.abs(up).argmin(axis=1)]
-    along = np.cross(least, up)
-    along /= np.linalg.norm(along, axis=1, keepdims=True)
-    axes = np.stack([along, np.cross(up, along), up], axis=1)
-    local = np.einsum("rik,rjk->rji", axes, sample[near] - here[:, None])
+    local = np.einsum("rik,rjk->rji", frames_of(up), sample[near] - here[:, None])
     size = np.sqrt((local**2).sum(axis=2).max(axis=1))
     local = local / size[:, None, None]
     x, y, z = np.moveaxis(local, 2, 0)

@@ -17,6 +17,15 @@ struct ElementsView {
     std::int64_t count;
 };
 
+// Loads the nodes of an element, and returns how many there are. points (n, D)
+template <int D, std::size_t MOST>
+int load_nodes(const double* points, const ElementsView& elements, std::int64_t e, std::array<Vec<D>, MOST>& nodes) {
+    const std::int32_t first = elements.offsets[e], count = elements.offsets[e + 1] - first;
+    for (std::int32_t i = 0; i < count; ++i)
+        nodes[i] = load<D>(points + static_cast<std::int64_t>(elements.nodes[first + i]) * D);
+    return count;
+}
+
 // Of each element; nothing is NaN where no coordinate is.
 struct Judgement {
     std::vector<std::uint8_t> verdict;
@@ -46,9 +55,7 @@ Judgement judge(const double* points, const ElementsView& elements, int threads)
     for_each_range(elements.count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         std::array<Vec<D>, MOST_NODES> nodes{};
         for (std::int64_t e = begin; e < end; ++e) {
-            const std::int32_t first = elements.offsets[e];
-            for (std::int32_t i = first; i < elements.offsets[e + 1]; ++i)
-                nodes[i - first] = load<D>(points + static_cast<std::int64_t>(elements.nodes[i]) * D);
+            load_nodes<D>(points, elements, e, nodes);
             const std::uint8_t code = elements.codes[e];
             result.verdict[e] = static_cast<std::uint8_t>(judge(code, nodes.data()));
             result.measure[e] = measure(code, nodes.data());

@@ -203,18 +203,17 @@ struct SurfaceRelocation {
 
     // Section 3.3: smart Laplacian first, the active-set method where the star stays below the threshold; what is pinched
     // almost flat the linear programme frees.
-    bool smooth(std::int64_t v, bool optimise, bool with_laplacian) {
+    bool smooth(std::int64_t v, bool optimise) {
         const Vec<3> here = at(v);
         double best = quality(here);
         if (!(best > 0.0)) return false;
-        bool moved = false;
         const auto better = [&](const Vec<3>& p) {
             const double there = quality(p);
             if (!(there > best) || !is_near(v, p) || makes_smaller(here, p)) return false;
             best = there;
             return true;
         };
-        if (with_laplacian) moved = take(v, star.centre, 1, better);
+        bool moved = take(v, star.centre, 1, better);
         if (optimise && best < LP_PINCHED_SINE2 && program.solve(star, true)) moved |= take(v, program.position, 1, better);
         if (!optimise || !(best < parameters.threshold_sine2)) return moved;
         double flat = min_sine2<2>(star, star.position, 0.0);
@@ -270,7 +269,7 @@ struct SurfaceRelocation {
 
     bool raise_smallest(std::int64_t v) {
         const double before = quality(at(v));
-        return before > 0.0 && before < parameters.threshold_sine2 && smooth(v, true, true);
+        return before > 0.0 && before < parameters.threshold_sine2 && smooth(v, true);
     }
 
     bool relocated(Move move, std::int64_t v) {
@@ -280,8 +279,8 @@ struct SurfaceRelocation {
             case Move::untangle_heights:
             case Move::untangle_coefficients: return untangle(v, true);
             case Move::combined_untangle: return combined_untangle(v);
-            case Move::smart_laplacian: return smooth(v, false, true);
-            case Move::combined_smooth: return smooth(v, true, true);
+            case Move::smart_laplacian: return smooth(v, false);
+            case Move::combined_smooth: return smooth(v, true);
             case Move::mean_ratio: return smooth_mean(v);
             case Move::raise_smallest: return raise_smallest(v);
             case Move::draw_back: return draw_back(v);

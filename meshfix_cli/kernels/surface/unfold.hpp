@@ -43,10 +43,7 @@ inline std::vector<double> unfold(const double* points, const ElementsView& elem
     for_each_range(elements.count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         std::array<Vec<3>, 4> nodes{};
         for (std::int64_t e = begin; e < end; ++e) {
-            const std::int32_t first = elements.offsets[e];
-            const int count = elements.offsets[e + 1] - first;
-            for (int i = 0; i < count; ++i)
-                nodes[i] = load<3>(points + static_cast<std::int64_t>(elements.nodes[first + i]) * 3);
+            const int count = load_nodes<3>(points, elements, e, nodes);
             const Vec<3> normal = load<3>(normals + e * 3), area = area_vector(nodes, count);
             const double size2 = norm2(area);
             Vec<3> up = size2 > 0.0 ? (1.0 / std::sqrt(size2)) * area : normal;
@@ -54,7 +51,7 @@ inline std::vector<double> unfold(const double* points, const ElementsView& elem
             const Plane plane(up);
             for (int i = 0; i < count; ++i) {
                 const Vec<2> x = plane.coordinates(nodes[i] - nodes[0]);
-                std::copy(x.begin(), x.end(), flat.begin() + static_cast<std::int64_t>(first + i) * 2);
+                std::copy(x.begin(), x.end(), flat.begin() + static_cast<std::int64_t>(elements.offsets[e] + i) * 2);
             }
         }
     });
@@ -67,10 +64,7 @@ inline std::vector<double> area_vectors(const double* points, const ElementsView
     for_each_range(elements.count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         std::array<Vec<3>, 4> nodes{};
         for (std::int64_t e = begin; e < end; ++e) {
-            const std::int32_t first = elements.offsets[e];
-            const int count = elements.offsets[e + 1] - first;
-            for (int i = 0; i < count; ++i)
-                nodes[i] = load<3>(points + static_cast<std::int64_t>(elements.nodes[first + i]) * 3);
+            const int count = load_nodes<3>(points, elements, e, nodes);
             const Vec<3> area = 0.5 * area_vector(nodes, count);
             std::copy(area.begin(), area.end(), areas.begin() + e * 3);
         }

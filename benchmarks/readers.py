@@ -22,8 +22,8 @@ from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.reading import parse
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Source
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "sample_meshes"))

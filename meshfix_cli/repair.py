@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh import curved
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
-    from meshfix_cli.meshfile.formats import Format
+    from meshfix_cli.meshfile.recognise import Format
     from meshfix_cli.meshfile.writing import Put
     from meshfix_cli.quality.obstacles import Obstacles
     from meshfix_cli.quality.requirement import Requirement

@@ -15,7 +15,7 @@ from meshfix_cli.errors import WriteError
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
-    from meshfix_cli.meshfile.formats import Format
+    from meshfix_cli.meshfile.recognise import Format
     from meshfix_cli.repair import Files, Held
 
 

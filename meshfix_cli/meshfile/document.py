@@ -16,9 +16,9 @@ from meshfix_cli.mesh.elements import counted, dimension_of
 from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import first_of_each_place
-from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.notes import concave, notes_on
 from meshfix_cli.meshfile.plane import plane_basis
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned

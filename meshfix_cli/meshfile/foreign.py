@@ -11,7 +11,8 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from meshfix_cli.meshfile.formats import HEAD, Format
+from meshfix_cli.meshfile.formats import HEAD
+from meshfix_cli.meshfile.recognise import Format
 
 MOST_BYTES = 65536  # of a data set that may be texts
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"

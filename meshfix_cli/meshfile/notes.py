@@ -11,7 +11,8 @@ from meshfix_cli.mesh.elements import counted
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import Topology
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
-from meshfix_cli.meshfile.formats import DRAWINGS, Format
+from meshfix_cli.meshfile.formats import DRAWINGS
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import Solved
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile import foreign, formats
 from meshfix_cli.meshfile.compressed import inner, is_compressed, unpacked
 from meshfix_cli.meshfile.document import Document, build, with_reversed
-from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.pieces import join
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Family, Source
 from meshfix_cli.meshfile.splice import Turned
 

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.splice import InPlace, Points, Turned
 
 # Cell arrays that tell materials apart: those of this package and of meshio, and those that other programs write.

@@ -25,9 +25,9 @@ from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
 from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
-from meshfix_cli.meshfile.formats import Format
 from meshfix_cli.meshfile.gmsh import cells as gmsh
 from meshfix_cli.meshfile.plainly import plainly
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 

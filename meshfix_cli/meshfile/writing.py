@@ -19,8 +19,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile import compressed, foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
-from meshfix_cli.meshfile.formats import PARTS, Format
+from meshfix_cli.meshfile.formats import PARTS
 from meshfix_cli.meshfile.reading import parse
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import in_common_types, solved_runs
 from meshfix_cli.meshfile.source import Arrays, Cells, Layout, Source
 from meshfix_cli.meshfile.splice import InPlace, Places, Points, differing

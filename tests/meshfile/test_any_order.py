@@ -12,7 +12,7 @@ from programs import gmsh_session
 from meshfix_cli import Mesh, read, untangle, write
 from meshfix_cli.errors import ReadError, WriteError
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.recognise import Format
 
 
 def of_order(path: Path, name: str, order: int) -> None:

@@ -16,6 +16,7 @@ from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.dolfin import parse
+from meshfix_cli.meshfile.recognise import Format
 
 SMALL = (
     b'<dolfin>\n<mesh celltype="triangle" dim="2">\n<vertices size="5">\n<vertex index="0" x="0" y="0"/>\n'
@@ -131,7 +132,7 @@ def test_files_beside_it_are_left_alone(tmp_path: Path) -> None:
 def test_what_is_wrong_is_named(data: bytes, words: str) -> None:
     with pytest.raises(ReadError, match=words):
         parse(data)
-    assert formats.sniff(data) == formats.Format("dolfin-xml")
+    assert formats.sniff(data) == Format("dolfin-xml")
 
 
 @pytest.mark.parametrize("name", FILES)

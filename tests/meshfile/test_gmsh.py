@@ -17,6 +17,7 @@ from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import formats, gmsh
 from meshfix_cli.meshfile.gmsh.cells import TYPES
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
@@ -89,13 +90,13 @@ def test_elements_of_version_1_are_those_of_its_types() -> None:
 def test_a_file_without_a_version_is_of_the_first() -> None:
     data = text_1().replace(b"NOD", b"Nodes").replace(b"ELM", b"Elements").replace(b"END", b"End")
     np.testing.assert_equal(tables(parsed(data)), tables(parsed(text_1())))
-    assert formats.sniff(data) == formats.sniff(text_1()) == formats.Format("gmsh1", False)
+    assert formats.sniff(data) == formats.sniff(text_1()) == Format("gmsh1", False)
 
 
 def test_names_of_groups_stand_before_version_1_too(tmp_path: Path) -> None:
     data = b'$PARA\n3 4\n$ENDPARA\n$PhysicalNames\n1\n2 7 "steel"\n$EndPhysicalNames\n' + text_1()
     assert {name: pair.tolist() for name, pair in parsed(data).arrays.groups.items()} == {"steel": [7, 2]}
-    assert formats.sniff(data) == formats.sniff(data[data.index(b"$Phys") :]) == formats.Format("gmsh1", False)
+    assert formats.sniff(data) == formats.sniff(data[data.index(b"$Phys") :]) == Format("gmsh1", False)
 
 
 def test_line_breaks_behind_binary_numbers_may_be_missing(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.mfem import parse
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import turned
 
 SMALL = b"""MFEM mesh v1.3
@@ -224,7 +225,7 @@ def test_the_boundary_of_elements_with_nodes_of_their_own_is_held() -> None:
 def test_what_is_not_read_is_named(data: bytes, words: str) -> None:
     with pytest.raises(ReadError, match=words):
         parse(data)
-    assert formats.sniff(data) == formats.Format("mfem")
+    assert formats.sniff(data) == Format("mfem")
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from meshfix_cli import read, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.off import parse
+from meshfix_cli.meshfile.recognise import Format
 
 SQUARE = b"OFF\n5 4 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n1.5 0.5 0\n3 0 1 4\n3 1 2 4\n3 2 3 4\n3 3 0 4\n"
 
@@ -67,7 +68,7 @@ def test_a_skew_plane_stays_one(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("keyword", ["OFF", "COFF", "NOFF", "CNOFF", "STOFF", "STCNOFF", "4OFF", "nOFF", "OFF BINARY"])
 def test_keywords_are_recognised(keyword: str) -> None:
-    assert formats.sniff(f"{keyword}\n5 4 0\n".encode()) == formats.Format("off")
+    assert formats.sniff(f"{keyword}\n5 4 0\n".encode()) == Format("off")
     assert formats.sniff(b"OFFICE\n") is None
 
 

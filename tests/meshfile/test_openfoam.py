@@ -262,7 +262,7 @@ def test_numbers_have_32_or_64_bits(sizes: str) -> None:
 
 
 def read_stream(path: Path) -> None:
-    from meshfix_cli.meshfile.formats import Format
     from meshfix_cli.meshfile.reading import parse
+    from meshfix_cli.meshfile.recognise import Format
 
     parse(path.read_bytes(), Format("openfoam"))

@@ -15,6 +15,7 @@ from second_order import SECOND, element, is_straight, reference
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.mesh.lagrange import kinds, lattice
 from meshfix_cli.meshfile import formats, reading, through_meshio
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 from meshfix_cli.meshfile.vtk.cells import TYPES
@@ -186,6 +187,6 @@ FURTHER = {"gmsh": ["wedge18", "pyramid14"], "gmsh22": ["wedge18", "pyramid14"],
 def test_what_is_written_in_another_format_has_the_order_of_that(name: str, key: str, tmp_path: Path) -> None:
     points = element(key)
     path = tmp_path / {"exodus": "one.e", "vtu": "one.vtu"}.get(name, "one.msh")
-    form = formats.Format(name, None if name == "exodus" else False)
+    form = Format(name, None if name == "exodus" else False)
     through_meshio.write(path, Source(points, [Cells(key, np.arange(len(points))[None])]), points, form)
     check(path, key)

@@ -18,7 +18,8 @@ from splicing import FORMATS, MODULES, WORD, make, pieces, repaired, value, with
 from meshfix_cli import read, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import reading, splice
-from meshfix_cli.meshfile.formats import Format, sniff
+from meshfix_cli.meshfile.formats import sniff
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import turned
 
 TABLE = [(name, variant) for name, module in MODULES.items() for variant in module.FILES]

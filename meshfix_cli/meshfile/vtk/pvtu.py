@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape
 
 from meshfix_cli.errors import ReadError, WriteError, naming
 from meshfix_cli.meshfile import formats
-from meshfix_cli.meshfile.formats import Format
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Source
 from meshfix_cli.meshfile.vtk import vtu
 from meshfix_cli.meshfile.vtk.xml import Element, XmlFile

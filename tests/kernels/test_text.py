@@ -274,3 +274,15 @@ def test_a_short_card_does_not_lend_its_kind_to_the_next() -> None:
     deck = (solid + "SPC\n" + solid).encode()
     names, kinds, *_ = kernels.find_cards(deck)
     assert bytes(names.ravel()[:6]) == b"CTETRA" and kinds.tolist() == [0, 1, 0]
+
+
+def test_a_line_that_continues_a_card_does_not_reach_beyond_the_fields_that_are_asked_for() -> None:
+    short, blank = b"CTETRA         1       1       7\n+              9\n", b"CTETRA\n"
+    deck, at = short + blank, np.array([0, len(short)])
+    none = np.iinfo(np.int64).min
+    values, bad = kernels.card_integers(deck, at, 0, 6, False)
+    assert bad == -1
+    assert values.tolist() == [[1, 1, 7, none, none, none], [none] * 6]
+    assert kernels.card_integers(deck, at, 8, 9, False)[0].tolist() == [[9], [none]]
+    _, starts, _ = kernels.card_fields(deck, at, 6, True)
+    assert starts.tolist() == [0, 6, 7]

@@ -340,6 +340,7 @@ void each_field_of(const CardText& deck, std::int64_t at, std::int64_t most, con
         });
         more = count < most && find_continuation(deck, line.next, at);
         while (more && count < std::min(most, first + line.fields())) f(count++, Span{}, line.width());
+        more = more && count < most;
     }
 }
 

@@ -406,7 +406,7 @@ def test_workers_end_with_the_command(inputs: Path, out: Path, environment: Path
     assert len(alive(process.pid)) >= 3
     process.kill()
     wait_for_the_end_of_all(process.pid)
-    process.communicate(timeout=10)
+    process.communicate(timeout=60)
     assert [p.name for p in out.iterdir()] == ["a.vtk"]
 
 

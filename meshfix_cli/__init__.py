@@ -9,26 +9,43 @@
 # Nothing is imported here: it would be before `__main__` can make an early signal end the process without a word.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from meshfix_cli.errors import InvalidMeshError, MeshfixError, OptionError, ReadError, RequirementError, WriteError
     from meshfix_cli.mesh.mesh import Mesh
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.meshfile.reading import read
     from meshfix_cli.meshfile.writing import write
+    from meshfix_cli.objects.api import Repairer, Result, perturb, quality, untangle
     from meshfix_cli.quality.summary import summarise
-    from meshfix_cli.solve.perturb import perturb
-    from meshfix_cli.solve.untangle import untangle
 
 __version__ = "0.1.0"
 
-__all__ = ["Document", "Mesh", "perturb", "read", "summarise", "untangle", "write"]
+__all__ = [
+    "Document",
+    "InvalidMeshError",
+    "Mesh",
+    "MeshfixError",
+    "OptionError",
+    "ReadError",
+    "Repairer",
+    "RequirementError",
+    "Result",
+    "WriteError",
+    "perturb",
+    "quality",
+    "read",
+    "summarise",
+    "untangle",
+    "write",
+]
 
 # Where the names are at home; a module is imported when one of its names is asked for.
 _HOME = {
     "Document": "meshfile.document",
     "Mesh": "mesh.mesh",
-    "perturb": "solve.perturb",
+    **dict.fromkeys(("Repairer", "Result", "perturb", "quality", "untangle"), "objects.api"),
+    **dict.fromkeys([name for name in __all__ if name.endswith("Error")], "errors"),
     "read": "meshfile.reading",
     "summarise": "quality.summary",
-    "untangle": "solve.untangle",
     "write": "meshfile.writing",
 }
 

@@ -2,6 +2,7 @@
 
 MeshfixError
 ├── InvalidMeshError    the arrays are not a triangle or tetrahedral mesh that can be worked on
+├── OptionError         an option has a value that it cannot have
 ├── ReadError           the file cannot be read, or holds no such mesh
 ├── RequirementError    what is required of a mesh cannot be judged
 └── WriteError          the result cannot be written
@@ -19,6 +20,10 @@ class MeshfixError(Exception):
 
 class InvalidMeshError(MeshfixError):
     """The arrays are not a triangle or tetrahedral mesh that can be worked on."""
+
+
+class OptionError(MeshfixError, ValueError):
+    """An option has a value that it cannot have."""
 
 
 class ReadError(MeshfixError):

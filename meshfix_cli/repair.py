@@ -74,14 +74,11 @@ class Held:
             Also where the elements are others.
         """
         from meshfix_cli.errors import naming
-        from meshfix_cli.mesh.reference import reference_points
+        from meshfix_cli.meshfile.displaced import places_in
 
         reference = replace(self, fix=(), regions=None, input_format=None).read(source, threads)
         with naming(f"{source}: as a reference"):
-            places = reference.source.points.astype("f8") if document.mesh.surface is not None else None
-            points = reference_points(document.mesh, reference.mesh, threads, places)
-            alike = reference.seen_from(document)
-            return points if alike is None else document.mesh.along_curve(alike)
+            return places_in(reference, document, threads)
 
 
 @dataclass(frozen=True)

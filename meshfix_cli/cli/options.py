@@ -252,9 +252,25 @@ _STORE = (
     click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
 )
 storing = packed("files", Files, *_STORE)
+
+
+def _output(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Let OUTPUT be named by an option as well."""
+
+    @click.option("--output", "-o", type=FILE, metavar="FILE", help="The same as OUTPUT.")
+    @wraps(command)
+    def with_output(output: str | None, **values: Any) -> Any:
+        if output is not None and values["target"] != "-":
+            raise click.UsageError("OUTPUT and --output are one and the same: give one of them")
+        return command(**values | ({} if output is None else {"target": output}))
+
+    return with_output
+
+
 writing = packed(
     "files",
     Files,
+    _output,
     click.argument("source", metavar="[INPUT]", default="-", type=FILE),
     click.argument("target", metavar="[OUTPUT]", default="-", type=FILE),
     click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from meshfix_cli.cli.files import open_files, report_stream, write_cells
+from meshfix_cli.cli.files import given, open_files, report_stream, write_cells
 from meshfix_cli.cli.names import FILE, HISTORY
 from meshfix_cli.cli.options import (
     Draw,
@@ -42,6 +42,12 @@ if TYPE_CHECKING:
     help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in it. "
     "Of a surface: that on which its vertices move.",
 )
+@click.option(
+    "--displace",
+    metavar="NAME",
+    help="Move each point first by its vector in this point-data array, as a morph or a time step gives it; INPUT as "
+    "it was is the reference then, unless there is another.",
+)
 @click.option("--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells
 @drawing
@@ -59,6 +65,7 @@ def untangle(
     show: Show,
     method: Method,
     reference: str | None,
+    displace: str | None,
     history: str | None,
     cells: str | None,
     draw: Draw,
@@ -74,14 +81,16 @@ def untangle(
     vertices at once), and the paper's LS (Laplacian), US (linear programme), CS (both for each vertex), LUS (3
     Laplacian sweeps, then the programme).
     """
+    from meshfix_cli.errors import naming
     from meshfix_cli.meshfile.atomic import write_text
+    from meshfix_cli.meshfile.displaced import displaced, places_in
     from meshfix_cli.meshfile.writing import check_cells
     from meshfix_cli.report.as_json import history_csv
     from meshfix_cli.report.terminal import console, with_progress
 
     show.check(verbose)
-    if reference is not None:
-        _check_reference(reference, method)
+    for option in given(reference and "--reference", displace and "--displace"):
+        _check_reference(option, reference, method)
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
         click.get_current_context().params["threads"] = 1
@@ -94,7 +103,14 @@ def untangle(
         document, output = open_files(files, held, show.threads, history, cells, *draw.names)
         if cells is not None:
             check_cells(document, cells)
-        before = None if reference is None else held.read_reference(reference, document, show.threads)
+        before = None
+        if displace is not None:
+            first = document
+            with naming(document.name):
+                document = displaced(first, displace)
+                before = places_in(first, document, show.threads)
+        if reference is not None:
+            before = held.read_reference(reference, document, show.threads)
         alone = partial(method.solve, threads=show.threads, watch=watch)
         solve, put = (root.solve, root.put) if root else (alone, None)
         report = repair(document, output, files, method, show.judge(draw, requirements), solve, put, before)
@@ -107,10 +123,10 @@ def untangle(
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
 
 
-def _check_reference(reference: str, method: Method) -> None:
-    """Refuse what makes no sense with a reference."""
+def _check_reference(option: str, reference: str | None, method: Method) -> None:
+    """Refuse what makes no sense with a reference, which an option gives."""
     if reference == "-":
         raise click.UsageError("--reference is a file: stdin is INPUT's")
     others = {"--only-invalid": method.only_invalid, "--threshold": method.threshold is not None}
-    for other in (name for name, given in others.items() if given):
-        raise click.UsageError(f"--reference and {other} exclude each other")
+    for other in (name for name, is_given in others.items() if is_given):
+        raise click.UsageError(f"{option} and {other} exclude each other")

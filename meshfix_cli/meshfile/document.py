@@ -67,6 +67,8 @@ class Document:
         The elements that are numbered the other way round, where the file's numbering says nothing of that.
     ties : Ties or None
         Which nodes lie between the corners of elements of second order, and follow these; None: there are none.
+    displaced : (n, d) float or None
+        Where the points are after a displacement, as the file holds them; None: where the file has them.
     """
 
     name: str
@@ -83,6 +85,7 @@ class Document:
     copies: NDArray[np.int64] | None = None
     arbitrary: NDArray[np.bool_] | None = None
     ties: Ties | None = field(default=None, repr=False)
+    displaced: NDArray[np.floating[Any]] | None = field(default=None, repr=False)
 
     @property
     def fixed(self) -> dict[str, int]:
@@ -126,7 +129,7 @@ class Document:
 
     def file_points(self, mesh: Mesh) -> NDArray[np.floating[Any]]:
         """Return the points of a moved mesh as the file holds them: shape, type and the bits of fixed vertices."""
-        original = self.source.points
+        original = self.source.points if self.displaced is None else self.displaced
         points: NDArray[np.floating[Any]] = original.copy()
         moved = kernels.moved(self.mesh.points, mesh.points, 1).view(bool) & self.mesh.used
         with np.errstate(over="ignore"):  # `in_plane` tells when float32 overflows

@@ -10,6 +10,7 @@ import os
 import re
 import tempfile
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
@@ -80,7 +81,7 @@ def read(data: bytes, form: Format, path: Path | None = None) -> Source:
         _refuse(foreign.misread(data, form))
         _refuse(_several_zones(path) if form.name == "cgns" else None)
         mesh = meshio.read(path, file_format=form.reader)
-        return _source(mesh, data, form)
+        return replace(source_of(mesh), data=data)
 
 
 def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format) -> None:
@@ -215,7 +216,8 @@ def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, 
     return sets
 
 
-def _source(mesh: Any, data: bytes, form: Format) -> Source:
+def source_of(mesh: Any) -> Source:
+    """Return what a meshio.Mesh holds."""
     points = _native(mesh.points)
     cells = [Cells(block.type, _native(block.data)) for block in mesh.cells]
     cell = {name: [_native(data) for data in runs] for name, runs in mesh.cell_data.items()}
@@ -234,7 +236,6 @@ def _source(mesh: Any, data: bytes, form: Format) -> Source:
         cells,
         load=lambda: arrays,
         regions=regions_among(cell),
-        data=data,
     )
 
 

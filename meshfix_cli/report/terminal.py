@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -71,6 +72,13 @@ def print_report(report: Report, out: Console, by_type: bool = False) -> None:
         _line(out, text, "bold green" if report.valid else "bold red")
     for met, text in required(report):
         _line(out, text, "green" if met else "bold red")
+
+
+def as_html(report: Report) -> str:
+    """Return what a terminal shows of a report, for a notebook."""
+    out = _Console(file=io.StringIO(), record=True, width=100, highlight=False)
+    print_report(report, out)
+    return out.export_html(inline_styles=True, code_format="<pre style='line-height:1.1'>{code}</pre>")
 
 
 def _line(out: Console, text: str, style: str = "") -> None:

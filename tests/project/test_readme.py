@@ -56,10 +56,12 @@ def test_commands_print_what_is_shown(folder: Path) -> None:
         assert SECONDS.sub("", printed) == SECONDS.sub("", output), command
 
 
-def test_python_example_prints_what_is_shown(folder: Path) -> None:
-    (example,) = blocks("python")
-    (output,) = blocks("text")
-    assert run([sys.executable, "-c", example], folder) == output
+def test_python_examples_print_what_is_shown(folder: Path) -> None:
+    """Each in the folder where those before have written; what is printed follows as a block of text."""
+    examples, outputs = blocks("python"), blocks("text")
+    assert len(examples) == len(outputs) >= 4
+    for example, output in zip(examples, outputs, strict=True):
+        assert run([sys.executable, "-c", example], folder) == output, example
 
 
 def test_options_of_commands_for_clusters_exist() -> None:

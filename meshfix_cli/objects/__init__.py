@@ -1,0 +1,1 @@
+"""Meshes of other libraries in, and meshes of the same kind out."""

@@ -1,0 +1,370 @@
+"""`untangle`, `perturb` and `quality` for meshes in memory, with the options of the command line."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from meshfix_cli.errors import InvalidMeshError, OptionError, naming
+from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.displaced import displaced, places_in
+from meshfix_cli.meshfile.document import Document, build
+from meshfix_cli.meshfile.recognise import Format
+from meshfix_cli.objects.kinds import Kind, kind_of
+from meshfix_cli.objects.options import (
+    OF_DOCUMENTS,
+    Length,
+    Names,
+    Options,
+    Perturbing,
+    Solving,
+    held_of,
+    judge_of,
+    length_of,
+    method_of,
+)
+from meshfix_cli.quality.summary import Summary, summarise
+from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair
+from meshfix_cli.report.sliding import sliding
+from meshfix_cli.solve.perturb import perturb as perturb_mesh
+from meshfix_cli.solve.records import Outcome, SweepRecord
+from meshfix_cli.solve.untangle import untangle as untangle_mesh
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from typing_extensions import Unpack
+
+    from meshfix_cli.report.facts import Report
+
+M = TypeVar("M")
+File = Document | str | os.PathLike[str]
+_IN_MEMORY = Format("memory")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Generic[M]):
+    """What became of a mesh.
+
+    Attributes
+    ----------
+    report : Report
+        All that the command line tells.
+    document : Document
+        The mesh as it came.
+    given : object
+        What was given.
+    kind : Kind or None
+        What that is; None: a document or a path.
+    """
+
+    report: Report
+    document: Document
+    given: M
+    kind: Kind | None = field(default=None)
+
+    @property
+    def mesh(self) -> M:
+        """A mesh of the kind that was given, with all its data; of a path or a document it is a `Mesh`."""
+        after: Any = self.after if self.kind is None else self.kind.moved(self.given, self.points)
+        return after
+
+    @property
+    def points(self) -> NDArray[np.floating[Any]]:
+        """The points (n, d), of the type that they came in."""
+        return self.report.points()
+
+    @property
+    def after(self) -> Mesh:
+        """The result."""
+        return self.report.mesh
+
+    @property
+    def summary(self) -> Summary:
+        """How good it is."""
+        return self.report.result
+
+    @property
+    def valid(self) -> bool:
+        """All elements are judged and none is inverted, and the mesh does not overlap itself."""
+        return self.report.valid
+
+    @property
+    def met(self) -> bool:
+        """All that was required of it holds."""
+        return self.report.met
+
+    @property
+    def records(self) -> Sequence[SweepRecord]:
+        """What each sweep did."""
+        return self.report.records
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What a user should know, a sentence each."""
+        return (*self.report.notes, *sliding(self.report))
+
+    def write(self, target: str | os.PathLike[str]) -> tuple[str, ...]:
+        """Write it in the format that the name tells or the file had; return what that format does not hold."""
+        from meshfix_cli.meshfile.writing import write
+
+        return write(self.document, self.after, target)[1]
+
+    def __repr__(self) -> str:
+        before, after = next(iter(self.report.stages.values())), self.summary
+        worst = "smallest angle" if after.jacobians is None else "smallest scaled Jacobian"
+        told = f"{after.inverted:,} of {after.elements:,} elements inverted ({before.inverted:,} before)"
+        return f"<{type(self).__name__} {self.report.name}: {told}, {worst} {after.smallest:.3g}>"
+
+    def _repr_html_(self) -> str:
+        """Return what the terminal shows, for a notebook."""
+        from meshfix_cli.report.terminal import as_html
+
+        return as_html(self.report)
+
+
+@overload
+def untangle(  # type: ignore[overload-overlap]
+    mesh: Mesh, strategy: str = "auto", *, reference: Mesh | None = None, **options: Unpack[Options]
+) -> Outcome: ...
+@overload
+def untangle(
+    mesh: File, strategy: str = "auto", *, reference: Any = None, **options: Unpack[Options]
+) -> Result[Mesh]: ...
+@overload
+def untangle(mesh: M, strategy: str = "auto", *, reference: Any = None, **options: Unpack[Options]) -> Result[M]: ...
+def untangle(
+    mesh: Any,
+    strategy: str = "auto",
+    *,
+    reference: Any = None,
+    displace: str | None = None,
+    fix: Names = (),
+    regions: str | None = None,
+    join_points: bool = False,
+    require: Names = (),
+    metrics: Names = (),
+    threads: int = 1,
+    **options: Any,
+) -> Any:
+    """Move interior vertices until no element is inverted, then improve the worst.
+
+    Parameters
+    ----------
+    mesh : object
+        A `meshio.Mesh`, a `pyvista.UnstructuredGrid` or `PolyData`, one of VTK, a path, a `Document`, or points
+        (n, 2 or 3) and cells as a pair: cells as an array (m, k) or as arrays by their types. It is not changed. Of a
+        `Mesh` the boundary is held.
+    strategy : str
+        A key of `STRATEGIES`: see `meshfix untangle --help`.
+    reference : object, optional
+        The same mesh before its boundary moved, of any of these kinds.
+    displace : str, optional
+        An array of point data, vectors by which points move first; the mesh as it came is the reference then.
+    fix, regions, join_points, require, metrics
+        See `meshfix untangle --help`; metrics are those of `--metric`.
+    threads : int
+        The result has the same bits for any number.
+    options
+        `sweeps`, `smooth`, `threshold`, `max_move`, `only_invalid`, `slide`, `slide_interfaces`, `feature_angle`,
+        `max_deviation`, `curving` of the command line. Lengths are numbers in model units, or texts such as "2h".
+
+    Returns
+    -------
+    Result
+        Of a `Mesh` an `Outcome`.
+
+    Raises
+    ------
+    MeshfixError
+        `OptionError` for an option, else with the sentence that the command line has.
+    """
+    method = method_of({"strategy": strategy, **options})
+    if isinstance(mesh, Mesh):
+        _check_bare(fix or regions or join_points or displace or require or metrics, options)
+        return _of_mesh(mesh, method, reference, threads)
+    if method.only_invalid and (reference is not None or displace is not None):
+        raise OptionError("a reference and only_invalid exclude each other")
+    judge = judge_of(metrics, require, threads)
+    document, kind = _document(mesh, held_of(fix, regions, join_points), threads)
+    moved, places, before = document, None, reference
+    with naming(document.name):
+        if displace is not None:
+            moved = displaced(document, displace)
+            before = document if reference is None else reference
+        if before is not None:
+            places = places_in(_document(before, Held(join_points=join_points), threads)[0], moved, threads)
+    report = repair(moved, moved.format, Files(dry_run=True), method, judge, reference=places)
+    return Result(report, moved, mesh, kind)
+
+
+@overload
+def perturb(  # type: ignore[overload-overlap]
+    mesh: Mesh, percent: float, dist: Length, seed: int = 0, *, threads: int = 1
+) -> tuple[Mesh, int]: ...
+@overload
+def perturb(mesh: File, percent: float, dist: Length, seed: int = 0, **options: Unpack[Perturbing]) -> Result[Mesh]: ...
+@overload
+def perturb(mesh: M, percent: float, dist: Length, seed: int = 0, **options: Unpack[Perturbing]) -> Result[M]: ...
+def perturb(
+    mesh: Any,
+    percent: float,
+    dist: Length,
+    seed: int = 0,
+    *,
+    slide: Sliding = "none",
+    fix: Names = (),
+    regions: str | None = None,
+    join_points: bool = False,
+    threads: int = 1,
+) -> Any:
+    """Tangle a mesh as the paper does: move some interior vertices by a distance in random directions.
+
+    Parameters
+    ----------
+    mesh : object
+        See `untangle`.
+    percent : float
+        Of all vertices; where that is more than there are free vertices, all of those move.
+    dist : float or str
+        In model units, or a text such as "2h".
+    seed : int
+    slide, fix, regions, join_points, threads
+        See `untangle`.
+
+    Returns
+    -------
+    Result
+        Of a `Mesh` the moved mesh, and how many vertices have moved.
+    """
+    length, method = length_of("dist", dist), method_of({"slide": slide})
+    if not 0 <= percent <= 100:
+        raise OptionError(f"percent is a number from 0 to 100, and not {percent!r}")
+    if isinstance(mesh, Mesh):
+        _check_bare(fix or regions or join_points, {} if slide == "none" else {"slide": slide})
+        return perturb_mesh(mesh, percent, length.length(mesh, threads), seed)
+    document, kind = _document(mesh, held_of(fix, regions, join_points), threads)
+    document = method.freed(document)
+    step = length.length(document.mesh, threads)
+    tangled, moved = perturb_mesh(document.mesh, percent, step, seed)
+    stages = {"before": document.mesh, "perturbed": document.as_stored(tangled)}
+    facts = {"moved": moved, "distance": step, "percent": percent, "seed": seed}
+    return Result(Judge(threads=threads).report("perturb", document, stages, facts=facts), document, mesh, kind)
+
+
+def quality(mesh: Any, metrics: Names = (), *, threads: int = 1) -> Summary:
+    """Tell how good a mesh is.
+
+    Parameters
+    ----------
+    mesh : object
+        See `untangle`.
+    metrics : sequence of str
+        Those of `--metric`.
+    threads : int
+    """
+    names = judge_of(metrics, (), threads).metrics
+    if not isinstance(mesh, Mesh):
+        mesh = as_surface(_document(mesh, Held(), threads)[0]).mesh
+    return summarise(mesh, names, threads)
+
+
+class Repairer:
+    """Repairs one mesh again and again as its points move; the mesh is built once.
+
+    Parameters
+    ----------
+    mesh : object
+        See `untangle`.
+    towards : bool
+        Elements get the shapes back that they have in it; it is valid then.
+    strategy, fix, regions, join_points, threads, options
+        See `untangle`.
+
+    Attributes
+    ----------
+    outcome : Outcome or None
+        That of the last call.
+    """
+
+    def __init__(
+        self,
+        mesh: Any,
+        strategy: str = "auto",
+        *,
+        towards: bool = False,
+        fix: Names = (),
+        regions: str | None = None,
+        join_points: bool = False,
+        threads: int = 1,
+        **options: Unpack[Solving],
+    ) -> None:
+        self.outcome: Outcome | None = None
+        self._method, self._threads = method_of({"strategy": strategy, **options}), threads
+        self._document = _document(mesh, held_of(fix, regions, join_points), threads)[0]
+        self._places: NDArray[np.float64] | None = None
+        if towards:
+            if self._method.only_invalid:
+                raise OptionError("towards and only_invalid exclude each other")
+            with naming(self._document.name):
+                self._places = places_in(self._document, self._document, threads)
+
+    def __call__(self, points: ArrayLike) -> NDArray[np.floating[Any]]:
+        """Return points (n, d) near given ones at which no element is inverted, where that can be.
+
+        Raises
+        ------
+        InvalidMeshError
+            They are of another shape, or not finite.
+        """
+        document = self._at(np.asarray(points))
+        freed = self._method.freed(document, self._places)
+        reach = self._method.reach(document.mesh, self._threads)
+        self.outcome = self._method.solve(freed.mesh, reach, self._threads, reference=self._places)
+        return freed.file_points(freed.first_valid_as_stored(self.outcome.after, self.outcome.before)[0])
+
+    def _at(self, points: NDArray[Any]) -> Document:
+        document = self._document
+        there = document.source.points
+        if points.shape != there.shape:
+            raise InvalidMeshError(
+                f"the points are an array of shape {points.shape}, and those of the mesh {there.shape}"
+            )
+        moved = points.astype(there.dtype)
+        if not np.isfinite(moved[document.mesh.used]).all():
+            raise InvalidMeshError("there are points that are not finite")
+        return replace(document, mesh=document.in_plane(moved.astype(np.float64), document.mesh), displaced=moved)
+
+
+def _of_mesh(mesh: Mesh, method: Method, reference: Mesh | None, threads: int) -> Outcome:
+    return untangle_mesh(
+        mesh, method.strategy, sweeps=method.sweeps, smooth=method.smooth, threshold=method.threshold,
+        max_move=math.inf if method.max_move is None else method.max_move.length(mesh, threads),
+        only_invalid=method.only_invalid, reference=reference, threads=threads,
+    )  # fmt: skip
+
+
+def _check_bare(given: object, options: Any) -> None:
+    """Refuse what a bare mesh has lost."""
+    if given or set(options) & set(OF_DOCUMENTS):
+        raise OptionError(
+            "a Mesh has neither names nor the shape of its boundary: give the document that `read` returns, for "
+            f"fix, regions, join_points, displace, require, metrics, {', '.join(OF_DOCUMENTS)}"
+        )
+
+
+def _document(mesh: Any, held: Held, threads: int) -> tuple[Document, Kind | None]:
+    """Return a document of a mesh, and what kind of object it is; None: a document or a path."""
+    if isinstance(mesh, Document):
+        return mesh, None
+    if isinstance(mesh, str | os.PathLike):
+        return held.read(os.fspath(mesh), threads), None
+    kind = kind_of(mesh)
+    with naming(kind.name):
+        source = kind.source(mesh)
+        return build(kind.name, source, _IN_MEMORY, held.fix, held.regions, held.join_points, threads), kind

@@ -1,0 +1,189 @@
+"""What a mesh in memory is, what it holds, and the same with other points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
+from meshfix_cli.meshfile.vtk.cells import TYPES, markings, runs
+
+# Elements that an array (m, k) names, by the coordinates of its points and by k.
+_OF_ARRAY = {
+    (2, 3): "triangle", (2, 4): "quad", (3, 3): "triangle", (3, 4): "tetra", (3, 5): "pyramid", (3, 6): "wedge",
+    (3, 8): "hexahedron",
+}  # fmt: skip
+# How polygons of VTK keep their cells, the types of these by the number of their vertices, and the type of others.
+_OF_POLYDATA: tuple[tuple[str, dict[int, int], int], ...] = (
+    ("Verts", {1: 1}, 2),
+    ("Lines", {2: 3}, 4),
+    ("Polys", {3: 5, 4: 9}, 7),
+    ("Strips", {}, 6),
+)
+_GHOSTS_DAMAGED = "its cell data {} cannot be read, and tell which cells are held"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Meshes of one library.
+
+    Attributes
+    ----------
+    name : str
+        What an object is called in a report.
+    source : callable
+        Gives what an object holds; it is not changed, and not kept.
+    moved : callable
+        (object, points (n, d)) -> one of its kind with these points, and with all that it holds else.
+    """
+
+    name: str
+    source: Callable[[Any], Source]
+    moved: Callable[[Any, NDArray[np.floating[Any]]], Any]
+
+
+def kind_of(mesh: object) -> Kind:
+    """Return what an object is.
+
+    Raises
+    ------
+    InvalidMeshError
+        It is no mesh of a library that is known.
+    """
+    for cls in type(mesh).__mro__:
+        library = cls.__module__.partition(".")[0]
+        if (library, cls.__name__) == ("meshio", "Mesh"):
+            return Kind("meshio.Mesh", _of_meshio, _moved_meshio)
+        if cls.__name__ in ("vtkUnstructuredGrid", "vtkPolyData"):
+            library = type(mesh).__module__.partition(".")[0]
+            return Kind(f"{library}.{type(mesh).__name__}", _of_vtk, _moved_vtk)
+    if isinstance(mesh, tuple | list) and len(mesh) == 2:
+        return Kind("(points, cells)", _of_arrays, _moved_arrays)
+    raise InvalidMeshError(
+        f"{type(mesh).__module__}.{type(mesh).__qualname__} is no mesh that meshfix knows: it takes a meshio.Mesh, "
+        "a pyvista.UnstructuredGrid or PolyData, one of VTK, a path, or points and cells as a pair; of other data sets "
+        "of VTK what pyvista's cast_to_unstructured_grid gives"
+    )
+
+
+def _of_meshio(mesh: Any) -> Source:
+    from meshfix_cli.meshfile.through_meshio import source_of
+
+    return source_of(mesh)
+
+
+def _moved_meshio(mesh: Any, points: NDArray[np.floating[Any]]) -> Any:
+    moved = mesh.copy()
+    moved.points = points
+    return moved
+
+
+def _of_arrays(mesh: Any) -> Source:
+    points, cells = np.asarray(mesh[0]), mesh[1]
+    if points.ndim != 2 or points.dtype.kind not in "fiu":
+        raise InvalidMeshError(f"the points are an array of shape {points.shape}, and not of (n, 2) or (n, 3) numbers")
+    return Source(points if points.dtype.kind == "f" else points.astype("f8"), [*_runs_of(points.shape[1], cells)])
+
+
+def _runs_of(dimension: int, cells: Any) -> Iterable[Cells]:
+    """Give the runs of cells that an array, a dict or pairs of types and arrays name."""
+    pairs: Any = cells.items() if isinstance(cells, Mapping) else cells
+    if not isinstance(cells, Mapping) and not _are_pairs(cells):
+        array = np.asarray(cells)
+        key = _OF_ARRAY.get((dimension, array.shape[-1])) if array.ndim == 2 else None
+        if key is None:
+            known = ", ".join(f"(m, {k}) of {name}" for (d, k), name in _OF_ARRAY.items() if d == dimension)
+            raise InvalidMeshError(
+                f"the cells are an array of shape {array.shape}; known are {known}; others by their types, as in "
+                "{'quad': array}"
+            )
+        pairs = [(key, array)]
+    for key, rows in pairs:
+        array = np.asarray(rows)
+        if array.ndim != 2 or array.dtype.kind not in "iu":
+            raise InvalidMeshError(f"the {key} cells are not an array (m, k) of whole numbers")
+        yield Cells(TYPES[key][0] if isinstance(key, int) and key in TYPES else str(key), array)
+
+
+def _are_pairs(cells: Any) -> bool:
+    """Whether cells are pairs of a type and an array."""
+    return isinstance(cells, list | tuple) and all(
+        isinstance(one, list | tuple) and len(one) == 2 and isinstance(one[0], str) for one in cells
+    )
+
+
+def _moved_arrays(mesh: Any, points: NDArray[np.floating[Any]]) -> Any:
+    return type(mesh)((points, mesh[1]))
+
+
+def _numpy(array: Any) -> Any:
+    """Return a copy of an array of VTK."""
+    return import_module("vtkmodules.util.numpy_support").vtk_to_numpy(array).copy()
+
+
+def _of_vtk(grid: Any) -> Source:
+    """Return what an unstructured grid or polygons hold; cells of one type are one run."""
+    points = _numpy(grid.GetPoints().GetData()) if grid.GetNumberOfPoints() else np.empty((0, 3))
+    types, offsets, connectivity = _cells_of_polygons(grid) if grid.IsA("vtkPolyData") else _cells_of_grid(grid)
+    found = runs(types, offsets, connectivity) if len(types) else []
+    point, cell = _arrays(grid.GetPointData()), _arrays(grid.GetCellData())
+    arrays = Arrays(point=point, cell={name: [values[run.rows] for run in found] for name, values in cell.items()})
+    regions, cells = markings(arrays.cell.keys(), [run.cells for run in found], lambda: arrays.cell, _GHOSTS_DAMAGED)
+    return Source(
+        points if points.dtype.kind == "f" else points.astype("f8"), cells, load=lambda: arrays,
+        regions=regions_among(regions),
+    )  # fmt: skip
+
+
+def _arrays(data: Any) -> dict[str, NDArray[Any]]:
+    """Return the arrays of numbers by their names."""
+    several = [data.GetArray(i) for i in range(data.GetNumberOfArrays())]  # None: texts
+    return {one.GetName(): _numpy(one) for one in several if one is not None and one.GetName()}
+
+
+def _cells_of_grid(grid: Any) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[Any]]:
+    """Return types (m,), offsets (m+1,) and connectivity."""
+    if not grid.GetNumberOfCells():
+        return (np.empty(0, dtype=np.int64),) * 3
+    try:
+        types = grid.GetCellTypes()
+    except TypeError:  # before VTK 9.6
+        types = grid.GetCellTypesArray()
+    return _numpy(types), *_cell_array(grid.GetCells())
+
+
+def _cell_array(cells: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    return _numpy(cells.GetOffsetsArray()).astype("i8"), _numpy(cells.GetConnectivityArray()).astype("i8")
+
+
+def _cells_of_polygons(grid: Any) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[Any]]:
+    """Return the same of vertices, lines, polygons and strips, in which order VTK numbers them."""
+    types, sizes, vertices = [np.empty(0, dtype=np.int64)], [np.zeros(1, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    for name, known, other in _OF_POLYDATA:
+        cells = getattr(grid, f"Get{name}")()
+        if cells is None or not cells.GetNumberOfCells():
+            continue
+        offsets, connectivity = _cell_array(cells)
+        sizes.append(np.diff(offsets))
+        types.append(np.full(len(sizes[-1]), other))
+        for size, number in known.items():
+            types[-1][sizes[-1] == size] = number
+        vertices.append(connectivity)
+    return np.concatenate(types), np.cumsum(np.concatenate(sizes)), np.concatenate(vertices)
+
+
+def _moved_vtk(grid: Any, points: NDArray[np.floating[Any]]) -> Any:
+    """Return a deep copy with other points, of the class of the object where that is one of pyvista."""
+    moved = grid.copy() if hasattr(grid, "copy") else grid.NewInstance()
+    if not hasattr(grid, "copy"):
+        moved.DeepCopy(grid)
+    changed = grid.GetPoints().NewInstance()
+    changed.SetData(import_module("vtkmodules.util.numpy_support").numpy_to_vtk(points, deep=1))
+    moved.SetPoints(changed)
+    return moved

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -286,3 +287,56 @@ def test_a_line_that_continues_a_card_does_not_reach_beyond_the_fields_that_are_
     assert kernels.card_integers(deck, at, 8, 9, False)[0].tolist() == [[9], [none]]
     _, starts, _ = kernels.card_fields(deck, at, 6, True)
     assert starts.tolist() == [0, 6, 7]
+
+
+def test_blank_lines_are_no_cards() -> None:
+    for deck in (b"\n", b"\n\n", b"ENDDATA\n\n", b"ENDDATA\n\n\n\n\n\n\n\n\n\n\n", b"A,1\n\n\n"):
+        assert len(kernels.find_cards(deck)[1]) == len(deck.split())
+
+
+def free_lines(random: np.random.Generator) -> list[bytes]:
+    """Fields as decks have them, and as they should not."""
+    words = [
+        b"1",
+        b"23",
+        b" 7 ",
+        b"",
+        b" ",
+        b"12345678",
+        b"123456789012",
+        b"-4",
+        b"+5",
+        b"1.5",
+        b"-1.-3",
+        b"THRU",
+        b"7$8",
+    ]
+    words += [b"1\t", b"9\r", b"0", b"12 3"]
+    lines = []
+    for _ in range(400):
+        count = int(random.integers(0, 11))
+        name = [b"GRID", b"CTETRA", b"GRID ", b"GRID*", b" GRID", b"+", b""][
+            random.choice(7, p=[0.4, 0.3, *[0.06] * 5])
+        ]
+        lines.append(b",".join([name, *(words[i] for i in random.integers(0, len(words), count))]))
+    return lines
+
+
+def test_free_lines_are_read_alike_in_one_pass_and_by_their_fields(random: np.random.Generator) -> None:
+    """A comment of no words behind a line makes it one that is not read in one pass."""
+    for _ in range(20):
+        lines = free_lines(random)
+        quick, slow = (kernels.find_cards(b"\n".join([*some, b""])) for some in (lines, [one + b"$" for one in lines]))
+        assert bytes(quick[0]) == bytes(slow[0])
+        np.testing.assert_array_equal(quick[1], slow[1])
+        np.testing.assert_array_equal(quick[3], slow[3])
+        np.testing.assert_array_equal(quick[4], slow[4])
+
+
+def test_short_lists_are_read_as_others_are(random: np.random.Generator) -> None:
+    for _ in range(50):
+        lists = [random.integers(0, 10 ** random.integers(1, 10), random.integers(1, 11)).tolist() for _ in range(30)]
+        text = "\n".join(f"{len(one)}({' '.join(map(str, one))})" for one in lists) + "\n" * int(random.integers(0, 99))
+        offsets, values, end, good = kernels.read_integer_lists(text.encode(), 0, len(lists))
+        assert good and end == len(text.rstrip())
+        assert [values[a:b].tolist() for a, b in pairwise(offsets)] == lists

@@ -114,10 +114,60 @@ class CellLoops {
     }
 };
 
-// `cells` is more than any number of a cell.
+// Tetrahedra that get their faces one after the other, in which order `CellLoops` has them.
+template <class Index>
+class Tetrahedra {
+  public:
+    std::vector<std::int8_t> counts;  // of the faces of each
+    std::vector<Index> nodes;         // four of each
+
+    explicit Tetrahedra(std::int64_t cells) : counts(cells, 0), nodes(4 * cells, -1) {}
+
+    // False: the cell is none. The loop is that of the face, and `inner` that it is seen from inside.
+    bool add(Index cell, const Index* loop, bool inner) {
+        Index* const mine = nodes.data() + 4 * cell;
+        const int before = counts[cell]++;
+        if (before == 0) {
+            mine[0] = loop[inner ? 2 : 0], mine[1] = loop[inner ? 0 : 2], mine[2] = loop[1];
+            return mine[0] != mine[1] && mine[1] != mine[2] && mine[2] != mine[0];
+        }
+        for (int i = 0; i < 3; ++i) {
+            if (among(mine, 3, loop[i])) continue;
+            if (mine[3] < 0) mine[3] = loop[i];
+            if (mine[3] != loop[i]) return false;
+        }
+        return before < 4 && mine[3] >= 0;
+    }
+
+  private:
+    static bool among(const Index* nodes, int count, Index vertex) {
+        bool found = false;
+        for (int i = 0; i < count; ++i) found |= nodes[i] == vertex;
+        return found;
+    }
+};
+
+// Finds the elements where all are tetrahedra, as nearly always where all faces are triangles; false: they are not.
+template <class Index>
+bool find_tetrahedra(const FacesView<Index>& mesh, std::int64_t cells, CellsOfFaces<Index>& found) {
+    Tetrahedra<Index> tets(cells);
+    for (Index face = 0; face < mesh.count; ++face) {
+        if (mesh.offsets[face + 1] - mesh.offsets[face] != 3) return false;
+        const Index *const loop = mesh.vertices + mesh.offsets[face], other = mesh.neighbour[face];
+        if (!tets.add(mesh.owner[face], loop, false) || (other >= 0 && !tets.add(other, loop, true))) return false;
+    }
+    if (std::any_of(tets.counts.begin(), tets.counts.end(), [](std::int8_t count) { return count != 4; })) return false;
+    found.width = 4;
+    found.corners = std::move(tets.counts);
+    found.nodes = std::move(tets.nodes);
+    return true;
+}
+
+// `cells` is more than any number of a cell. Where all are tetrahedra nobody asks for their sides.
 template <class Index>
 CellsOfFaces<Index> cells_of_faces(const FacesView<Index>& mesh, std::int64_t cells, int threads) {
     CellsOfFaces<Index> found;
+    if (find_tetrahedra(mesh, cells, found)) return found;
     found.starts.assign(cells + 1, 0);
     const auto each_side = [&](const auto& f) {  // ~face: seen from its neighbour
         for (Index face = 0; face < mesh.count; ++face) {

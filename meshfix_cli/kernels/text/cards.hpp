@@ -259,17 +259,55 @@ inline Span scan_line(std::string_view text, const CardLine& line, std::int64_t&
     return named;
 }
 
+// Adds the card of a free line, of whose name that is known and at whose first comma `at` is, in one pass, and goes to the
+// next line; false: it has more fields than a line of columns, or what only `CardLine` knows, and nothing was done.
+inline bool add_free_line(std::string_view text, std::int64_t begin, std::int64_t& at, Cards& cards) {
+    constexpr int FIELDS = 8;
+    const char *const start = text.data(), *const end = start + text.size(), *p = start + at;
+    std::array<std::int64_t, Cards::HEAD> head;
+    head.fill(BLANK_FIELD);
+    std::int64_t filled = 0;
+    for (int i = 0; p < end && *p == ','; ++i) {
+        if (i == FIELDS) return false;
+        while (++p < end && *p == ' ') {}
+        std::int64_t value = OTHER_FIELD;
+        const char* behind = p + read_few_digits(p, end, value);
+        if (behind == p || behind == end || (*behind != ',' && *behind != '\n')) {
+            for (behind = p; behind < end && *behind != ',' && *behind != '\n'; ++behind)
+                if (*behind == '$' || *behind == '\r' || *behind == '\t') return false;
+            value = read_integer_field(text, {p - start, behind - start});
+        }
+        if (value != BLANK_FIELD) filled = i + 1;
+        if (i < Cards::HEAD) head[i] = value;
+        p = behind;
+    }
+    cards.add(cards.kinds.back(), begin);
+    std::copy(head.begin(), head.end(), cards.heads.end() - Cards::HEAD);
+    cards.fields.back() = filled;
+    at = p - start + 1;
+    return true;
+}
+
 inline Cards find_cards(const CardText& deck) {
     const std::string_view text = deck.text;
     const bool plain = !deck.commas && !deck.tabs && !deck.returns;
     Cards cards(deck.size());
     Span named{0, 0};
     std::int64_t first = 0;        // the number of the first field of a line
-    constexpr std::string_view NO_NAME = "\n";
-    std::string_view name = NO_NAME;  // the first columns of the last card, in a text of columns alone, if there are eight
+    std::string_view name;         // the first columns of the last card, in a text of columns alone, if there are eight
+    std::string_view free_name;    // what the last card begins with, in a free line: the comma is the last of it
     bool large = false;
     for (std::int64_t at = 0; at < deck.size();) {
-        if (plain && text.compare(at, 8, name) == 0) {  // as nearly always
+        if (!free_name.empty() && text.compare(at, free_name.size(), free_name) == 0) {
+            std::int64_t next = at + static_cast<std::int64_t>(free_name.size()) - 1;
+            if (add_free_line(text, at, next, cards)) {
+                named = Span{next - 1, next - 1};
+                first = 8;
+                at = next;
+                continue;
+            }
+        }
+        if (plain && !name.empty() && text.compare(at, 8, name) == 0) {  // as nearly always
             const std::int64_t last = find_byte(text, '\n', at, deck.size());
             const CardLine line(at, deck.comments ? find_byte(text, '$', at, last) : last, last + 1, large);
             cards.add(cards.kinds.back(), at);
@@ -284,8 +322,10 @@ inline Cards find_cards(const CardText& deck) {
         if (!line.continues(text)) {
             cards.add(line.name(text), line.begin);
             first = 0;
-            name = line.end >= line.begin + 8 ? text.substr(line.begin, 8) : NO_NAME;
+            name = line.end >= line.begin + 8 ? text.substr(line.begin, 8) : std::string_view();
             large = line.large;
+            const bool close = line.free && !large && line.first.begin == line.begin && line.first.end == line.data;
+            free_name = close ? text.substr(line.begin, line.data + 1 - line.begin) : std::string_view();
         } else if (cards.begin.empty()) {
             continue;
         } else if (is_other_name(text, named, line.first)) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <string_view>
 #include <vector>
@@ -31,6 +32,28 @@ inline bool passes(std::string_view text, std::int64_t& at, char byte) {
     return true;
 }
 
+// Reads the next list where it has a few numbers of few digits each with one byte between them, as nearly all have, and
+// nothing else; false: it is another, and `at` stays.
+template <class T>
+bool read_short_list(std::string_view text, std::int64_t& at, std::vector<T>& values) {
+    constexpr int MOST = 9, DIGITS = 8;
+    const char* p = text.data() + at;
+    const char* const end = text.data() + text.size();
+    while (p < end && separates(*p)) ++p;
+    const int size = end - p > 2 + MOST * (DIGITS + 1) && p[1] == '(' ? *p - '0' : 0;
+    if (size < 1 || size > MOST) return false;
+    std::array<std::int64_t, MOST> found;
+    p += 2;
+    for (int i = 0; i < size; ++i, ++p) {
+        const int few = read_few_digits(p, end, found[i]);
+        p += few;
+        if (few == 0 || *p != (i + 1 < size ? ' ' : ')')) return false;
+    }
+    for (int i = 0; i < size; ++i) values.push_back(static_cast<T>(found[i]));
+    at = p - text.data();
+    return true;
+}
+
 // Reads `count` lists; where they end, or something else stands there, `end` is behind the last that is whole.
 template <class T>
 IntegerLists<T> read_integer_lists(std::string_view text, std::int64_t at, std::int64_t count) {
@@ -44,6 +67,11 @@ IntegerLists<T> read_integer_lists(std::string_view text, std::int64_t at, std::
     };
     for (lists.end = at; count > 0; --count, lists.end = at) {
         std::int64_t size = 0, value = 0;
+        if (read_short_list(text, at, lists.values)) {
+            lists.offsets.push_back(static_cast<T>(lists.values.size()));
+            lists.fit &= static_cast<std::size_t>(lists.offsets.back()) == lists.values.size();
+            continue;
+        }
         lists.good = read(size) && passes(text, at, '(');
         for (std::int64_t i = 0; lists.good && i < size; ++i) {
             lists.good = read(value);

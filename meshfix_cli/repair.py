@@ -110,7 +110,7 @@ class Files:
         if not self.dry_run:
             check_output(document, self.target, output)
         if document.is_file(self.target) and not (document.is_kept_by(output) or self.backup or self.dry_run):
-            lost = f"would be written anew as {output.name} by meshio, which may not know all of it"
+            lost = f"would be written anew as {output.name}, which may not hold all of it"
             raise WriteError(f"{self.target}: {lost}; name another OUTPUT, or use --backup")
         return document, output
 
@@ -138,7 +138,7 @@ class Files:
             return stored, (*notes, f"converted from {document.format.name} to {output.name}{lost}")
         if not lost and (document.source.data is None or b"\0" in document.source.data):
             lost = ": what it does not know of the input is lost"
-        return stored, (*notes, f"written anew as {output.name} by meshio{lost}")
+        return stored, (*notes, f"written anew as {output.name}{lost}")
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.mesh.elements import dimension_of, words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile import compressed, foreign, formats
+from meshfix_cli.meshfile import anew, compressed, foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import PARTS
@@ -274,16 +274,19 @@ def _merged(source: Source, form: Format) -> Source:
 def _write_anew(
     path: Path, source: Source, points: NDArray[np.floating[Any]], form: Format
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
-    """Let meshio write, and read it again: return the points (n, d) as the file holds them, and what was dropped.
+    """Write and read again; return the points (n, d) as the file holds them, and what was dropped.
 
     Raises
     ------
     WriteError
         The format cannot hold the elements that are solved for, or rounds them too much.
     """
-    from meshfix_cli.meshfile import through_meshio
+    if form.name in anew.WRITERS:
+        path.write_bytes(anew.written(source, points, form))
+    else:
+        from meshfix_cli.meshfile import through_meshio
 
-    through_meshio.write(path, source, points, form)
+        through_meshio.write(path, source, points, form)
     runs = [source.cells[i] for i in solved_runs(source.cells)]
     expected = np.concatenate([run.vertices.ravel() for run in runs])
     held = points.astype(np.float64)

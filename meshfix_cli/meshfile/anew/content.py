@@ -1,0 +1,130 @@
+"""What is written of a mesh in another format: its elements, what tells materials apart, and sets by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from meshfix_cli.mesh.elements import dimension_of
+from meshfix_cli.meshfile.groups import groups_of
+from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
+from meshfix_cli.meshfile.splice import Points
+
+Int64 = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """A mesh as any format may hold it.
+
+    Attributes
+    ----------
+    points : (n, d) float64
+    cells : sequence of Cells
+        One run for each type.
+    regions : sequence of (m,) int64, or None
+        A number for each cell of each run, that of its material; None: nothing tells materials apart.
+    titles : dict
+        Names of materials by the dimension of their cells and by number, where they have any.
+    sets : dict
+        For each other group of cells its rows in each run.
+    point_sets : dict
+        Rows of points by name.
+    arrays : Arrays
+        All data as they are, those of materials among them.
+    region : str or None
+        The name of the array that `regions` are made of.
+    """
+
+    points: Points
+    cells: Sequence[Cells]
+    regions: Sequence[Int64] | None
+    titles: Mapping[tuple[int, int], str]
+    sets: Mapping[str, Sequence[Int64]]
+    point_sets: Mapping[str, Int64]
+    arrays: Arrays
+    region: str | None
+
+    @classmethod
+    def of(cls, source: Source, points: Points) -> Content:
+        """Find what belongs to a name, in a source that has one run for each type."""
+        arrays = source.arrays
+        region = next((name for name in (PHYSICAL, *source.regions) if name in arrays.cell), None)
+        labels = None if region is None else _whole([np.asarray(values) for values in arrays.cell[region]])
+        named = {
+            name: (int(about[1]), int(about[0]))
+            for name, about in arrays.groups.items()
+            if np.shape(about) == (2,) and np.asarray(about).dtype.kind in "iu"
+        }
+        titles = {key: name for name, key in named.items()} if labels is not None else {}
+        sets: dict[str, list[Int64]] = {}
+        point_sets: dict[str, Int64] = {}
+        for name, group in groups_of(source).items():
+            if name in named and labels is not None:
+                continue
+            if len(group.nodes):
+                point_sets[name] = group.nodes
+            if group.cells:
+                mine = {id(run): rows for run, rows in group.cells}
+                sets[name] = [mine.get(id(run), np.empty(0, dtype=np.int64)) for run in source.cells]
+        return cls(points, source.cells, labels, titles, sets, point_sets, arrays, region)
+
+    def title(self, dimension: int, number: int) -> str:
+        """Return what a material is called; one without a name by its number."""
+        return self.titles.get((dimension, number), f"region_{number}")
+
+    def parts(self) -> Iterator[tuple[Cells, int, Int64]]:
+        """Give for each material of each run its number, 0 where there is none, and the rows (k,) of its cells."""
+        for i, run in enumerate(self.cells):
+            labels = np.zeros(len(run.vertices), dtype=np.int64) if self.regions is None else self.regions[i]
+            for number in np.unique(labels).tolist():
+                yield run, number, np.flatnonzero(labels == number)
+
+    @property
+    def dimension(self) -> int:
+        """The highest of the cells."""
+        return max((dimension_of(run.type) for run in self.cells), default=0)
+
+    def in_space(self) -> NDArray[np.float64]:
+        """Return the points (n, 3)."""
+        points = np.asarray(self.points, dtype=np.float64)
+        return points if points.shape[1] == 3 else np.column_stack([points, np.zeros(len(points))])
+
+
+def words_of(names: Sequence[str], allowed: str = r"\w.+-", longest: int = 80, lower: bool = False) -> dict[str, str]:
+    """Return what names become where a format allows few characters: no two the same.
+
+    Parameters
+    ----------
+    allowed : str
+        The characters, as in a class of a regular expression; of others an underscore stands for each run.
+    longest : int
+        How many characters there may be.
+    lower : bool
+        Capital letters are none of their own.
+    """
+    found: dict[str, str] = {}
+    taken = set()
+    for name in names:
+        word = first = re.sub(rf"[^{allowed}]+", "_", name)[:longest] or "_"
+        count = 1
+        while (word.lower() if lower else word) in taken:
+            count += 1
+            end = f"_{count}"
+            word = first[: longest - len(end)] + end
+        taken.add(word.lower() if lower else word)
+        found[name] = word
+    return found
+
+
+def _whole(runs: Sequence[NDArray[Any]]) -> list[Int64]:
+    """Return labels as whole numbers: as they are, or numbered where they are none."""
+    if all(values.dtype.kind in "biu" or (np.isfinite(values) & (values == np.round(values))).all() for values in runs):
+        return [values.astype(np.int64) for values in runs]
+    ends = np.cumsum([len(values) for values in runs])[:-1]
+    return np.split(np.unique(np.concatenate(runs), return_inverse=True)[1].astype(np.int64) + 1, ends)

@@ -57,6 +57,7 @@ class Own:
 # By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
 # in which each element has its group: meshio's writer of 4.1 has one for each run of them.
 _VTK_GROUPS = "cell data that are called like a material"
+_LZ4 = "`lz4`, where numbers are compressed so"
 OWN = {
     "stl": Own(
         "stl", recognise.stl, {".stl": "stl"}, "STL",
@@ -73,8 +74,12 @@ OWN = {
     ),
     "pvtu": Own("vtk.pvtu", recognise.pvtu, {".pvtu": "pvtu"}, "VTK", "with its pieces, which are `.vtu`", _VTK_GROUPS),
     "vtu": Own(
-        "vtk.vtu", recognise.vtu, {".vtu": "vtu"}, "VTK",
-        "text, base64, appended; uncompressed, zlib, lz4, lzma", _VTK_GROUPS, "`lz4`, where numbers are compressed so",
+        "vtk.vtu", recognise.of_vtk("UnstructuredGrid", "vtu"), {".vtu": "vtu"}, "VTK",
+        "text, base64, appended; uncompressed, zlib, lz4, lzma", _VTK_GROUPS, _LZ4,
+    ),
+    "vtp": Own(
+        "vtk.vtp", recognise.of_vtk("PolyData", "vtp"), {".vtp": "vtp"}, "VTK",
+        "as `.vtu`; strips of triangles are held", _VTK_GROUPS, _LZ4,
     ),
     "ply": Own(
         "ply", recognise.ply, {".ply": "ply"}, "PLY",

@@ -84,11 +84,15 @@ def _vtk_xml(text: str, kind: str) -> bool:
     return re.search(rf"<VTKFile[^>]*\stype\s*=\s*[\"']{kind}", text) is not None
 
 
-def vtu(_: bytes, text: str) -> Format | None:
-    """Recognise the type of the data set."""
-    if not (_is_xml(text) and _vtk_xml(text, "UnstructuredGrid")):
-        return None
-    return Format("vtu", re.search(r"format\s*=\s*[\"']ascii", text) is None)
+def of_vtk(kind: str, form: str) -> Callable[[bytes, str], Format | None]:
+    """Return what recognises an XML file of VTK by the type of its data set."""
+
+    def recognise(_: bytes, text: str) -> Format | None:
+        if not (_is_xml(text) and _vtk_xml(text, kind)):
+            return None
+        return Format(form, re.search(r"format\s*=\s*[\"']ascii", text) is None)
+
+    return recognise
 
 
 def pvtu(_: bytes, text: str) -> Format | None:

@@ -31,6 +31,10 @@ TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() 
 # Of any order, by the number of nodes; Bezier's have nodes that lie elsewhere, and VTK knows no pyramids of these.
 _LAGRANGE = {68: "line", 69: "triangle", 70: "quad", 71: "tetra", 72: "hexahedron", 73: "wedge"}
 _HEXAHEDRON = 72
+# The types of cells that polydata do not tell: that of any number of vertices, and those of some numbers.
+POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
+    b"vertices": (2, {1: 1}), b"lines": (4, {2: 3}), b"polygons": (7, {3: 5, 4: 9}), b"triangle_strips": (6, {})
+}  # fmt: skip
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 
 
@@ -102,6 +106,14 @@ def runs(
         order = kinds()[name].order_of("vtk 8") if old and number == _HEXAHEDRON and name in kinds() else None
         found.append(Run(name, rows, vertices if order is None else vertices[:, order], order))
     return found
+
+
+def types_of_sizes(sizes: NDArray[np.int64], other: int, known: Mapping[int, int]) -> NDArray[np.int64]:
+    """Return the types of cells of which a section tells only how many vertices each has; see `POLYDATA`."""
+    types = np.full(len(sizes), other)
+    for size, kind in known.items():
+        types[sizes == size] = kind
+    return types
 
 
 def _lagrange(family: str, size: int) -> str | None:

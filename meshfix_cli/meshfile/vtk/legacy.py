@@ -18,13 +18,9 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import chain
-from meshfix_cli.meshfile.vtk.cells import TYPES, Run, markings, runs
+from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, Run, markings, runs, types_of_sizes
 from meshfix_cli.meshfile.vtk.sections import Array, Sections, find_sections
 
-# The types of cells that polydata do not tell: that of any number of vertices, and those of some numbers.
-_POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
-    b"vertices": (2, {1: 1}), b"lines": (4, {2: 3}), b"polygons": (7, {3: 5, 4: 9}), b"triangle_strips": (6, {})
-}  # fmt: skip
 _POLYHEDRON = 42
 _OLD = re.compile(rb"(?:\xef\xbb\xbf)?\s*# vtk DataFile Version\s+(?:[0-4](?!\d)|5\.0)")
 
@@ -100,7 +96,7 @@ def _places(numbers: Array, first: Callable[[], NDArray[np.int64]], size: int) -
 def _tables(found: Sections) -> list[_Table]:
     """The sections of cells, in the order in which VTK counts their cells."""
     tables: list[_Table] = []
-    for keyword in _POLYDATA if found.dataset == b"polydata" else (b"cells",):
+    for keyword in POLYDATA if found.dataset == b"polydata" else (b"cells",):
         if keyword in found.cells:
             first = tables[-1].first + len(tables[-1].types) if tables else 0
             tables.append(_table(first, keyword, found))
@@ -112,7 +108,7 @@ def _tables(found: Sections) -> list[_Table]:
 def _table(first: int, keyword: bytes, found: Sections) -> _Table:
     count, where, array = found.cells[keyword]
     types, numbers = None, _integers(array)
-    if keyword not in _POLYDATA:
+    if keyword not in POLYDATA:
         if found.types is None:
             raise ReadError("is truncated: the section CELL_TYPES is missing")
         types = _integers(found.types)
@@ -124,7 +120,7 @@ def _table(first: int, keyword: bytes, found: Sections) -> _Table:
         if ends != [0, 0, len(numbers), len(numbers)]:
             raise ReadError("is not a readable vtk file: the offsets of its cells do not fit their vertices")
     if types is None:
-        types = _types(np.diff(offsets), *_POLYDATA[keyword])
+        types = types_of_sizes(np.diff(offsets), *POLYDATA[keyword])
     return _Table(first, types, offsets, numbers, array, int(where is None))
 
 
@@ -154,13 +150,6 @@ def _starts(numbers: Integers, count: int, types: Integers | None) -> NDArray[np
         if sizes.all() and ends[-1:] == len(numbers) and (numbers[ends - sizes - 1] == sizes).all():
             return ends - sizes - 1
     return chain(numbers, count, "the numbers of vertices of its cells do not add up")
-
-
-def _types(sizes: NDArray[np.int64], other: int, known: dict[int, int]) -> NDArray[np.int64]:
-    types = np.full(len(sizes), other)
-    for size, kind in known.items():
-        types[sizes == size] = kind
-    return types
 
 
 def _cells(table: _Table, run: Run, ids: NDArray[np.int64]) -> Cells:

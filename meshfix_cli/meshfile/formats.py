@@ -86,8 +86,13 @@ OWN = {
         "text and binary; normals of the facets that moved are computed again", "none",
     ),
     "medit": Own(
-        "medit", recognise.medit, {".mesh": "medit"}, "MEDIT",
-        "text; required vertices and edges, and corners, are held", "references",
+        "medit.text", recognise.medit, {".mesh": "medit"}, "MEDIT",
+        "text; required vertices and edges, and corners, are held, and so are solids of second order whose order of "
+        "nodes the file does not give", "references",
+    ),
+    "meshb": Own(
+        "medit.binary", recognise.meshb, {".meshb": "meshb"}, "MEDIT",
+        "binary, versions 1 to 4, of either order of bytes; what is held, as in `.mesh`", "references",
     ),
     "lsdyna": Own(
         "lsdyna", recognise.lsdyna, dict.fromkeys((".k", ".key", ".dyn"), "lsdyna"), "LS-DYNA",
@@ -234,7 +239,7 @@ def writers() -> tuple[str, ...]:
     import meshio
 
     both = set(meshio._helpers._writer_map) & set(meshio._helpers.reader_map)
-    return tuple(sorted(both - {"tetgen", *ENDLESS} | {"gmsh22", "vtk42"}))
+    return tuple(sorted(both - {"tetgen", *ENDLESS} | {"gmsh22", "vtk42", "meshb"}))
 
 
 def options(form: Format) -> dict[str, object]:

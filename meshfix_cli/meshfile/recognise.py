@@ -52,6 +52,12 @@ def medit(_: bytes, text: str) -> Format | None:
     return Format("medit") if re.match(r"(#.*\n\s*)*MeshVersionFormatted\b", text) else None
 
 
+def meshb(data: bytes, _: str) -> Format | None:
+    """Recognise the number 1, a version, and the keyword of the dimension."""
+    head = rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03"
+    return Format("meshb") if re.match(head, data) else None
+
+
 def obj(_: bytes, text: str) -> Format | None:
     """Recognise a vertex behind a comment, a name or a material."""
     vertices = re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE)

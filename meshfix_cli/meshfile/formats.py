@@ -81,6 +81,11 @@ OWN = {
         "vtk.vtp", recognise.of_vtk("PolyData", "vtp"), {".vtp": "vtp"}, "VTK",
         "as `.vtu`; strips of triangles are held", _VTK_GROUPS, _LZ4,
     ),
+    "vtkhdf": Own(
+        "vtk.vtkhdf", recognise.in_hdf5(b"VTKHDF", "vtkhdf"), {".vtkhdf": "vtkhdf"}, "VTK",
+        "in HDF5, unstructured grids and polydata in parts, and blocks of them; steps in time of one mesh",
+        _VTK_GROUPS + "; blocks", "`h5py`",
+    ),
     "ply": Own(
         "ply", recognise.ply, {".ply": "ply"}, "PLY",
         "text and binary; normals of the facets that moved are computed again", "none",

@@ -65,7 +65,7 @@ OWN = {
     ),
     "vtk": Own(
         "vtk.legacy", recognise.vtk, {".vtk": "vtk"}, "VTK",
-        "1.0 to 5.1, text and binary, unstructured grids and polygons", _VTK_GROUPS,
+        "1.0 to 5.1, text and binary, unstructured and structured grids, and polygons", _VTK_GROUPS,
     ),
     "gmsh": Own(
         "gmsh", recognise.gmsh, {".msh": "gmsh22"}, "gmsh",
@@ -80,6 +80,10 @@ OWN = {
     "vtp": Own(
         "vtk.vtp", recognise.of_vtk("PolyData", "vtp"), {".vtp": "vtp"}, "VTK",
         "as `.vtu`; strips of triangles are held", _VTK_GROUPS, _LZ4,
+    ),
+    "vts": Own(
+        "vtk.vts", recognise.vts, {".vts": "vts"}, "VTK",
+        "as `.vtu`, of one piece; no grids without coordinates for each point (`.vti`, `.vtr`)", _VTK_GROUPS, _LZ4,
     ),
     "vtkhdf": Own(
         "vtk.vtkhdf", recognise.in_hdf5(b"VTKHDF", "vtkhdf"), {".vtkhdf": "vtkhdf"}, "VTK",

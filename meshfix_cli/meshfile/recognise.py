@@ -101,6 +101,13 @@ def of_vtk(kind: str, form: str) -> Callable[[bytes, str], Format | None]:
     return recognise
 
 
+def vts(data: bytes, text: str) -> Format | None:
+    """Recognise structured grids, and those without points, which are refused by their names."""
+    if _is_xml(text) and _vtk_xml(text, "P?(?:ImageData|RectilinearGrid)"):
+        return Format("vts")
+    return of_vtk("StructuredGrid", "vts")(data, text)
+
+
 def pvtu(_: bytes, text: str) -> Format | None:
     """Recognise the type of the data set."""
     return Format("pvtu") if _is_xml(text) and _vtk_xml(text, "PUnstructuredGrid") else None

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, counted
 from meshfix_cli.mesh.lagrange import kinds
+from meshfix_cli.meshfile.blocks import cells_of_block
 from meshfix_cli.meshfile.source import Cells, regions_among
 from meshfix_cli.meshfile.tables import alike
 
@@ -114,6 +115,21 @@ def types_of_sizes(sizes: NDArray[np.int64], other: int, known: Mapping[int, int
     for size, kind in known.items():
         types[sizes == size] = kind
     return types
+
+
+def in_rows(shape: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the types, offsets and connectivity, as `runs` takes them, of a grid with points along each index."""
+    along = [size for size in shape if size > 1]
+    if not along or 0 in shape:
+        return np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64)
+    key, vertices = cells_of_block(along)
+    types = np.full(len(vertices), ELEMENTS[key].vtk)
+    return types, np.arange(len(vertices) + 1) * vertices.shape[1], vertices.ravel()
+
+
+def no_points(kind: str) -> ReadError:
+    """Return the error for a grid whose points follow from a few numbers."""
+    return ReadError(f"holds a grid ({kind}) whose points have no coordinates of their own that could change")
 
 
 def _lagrange(family: str, size: int) -> str | None:

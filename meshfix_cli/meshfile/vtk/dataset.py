@@ -58,10 +58,10 @@ def parse(data: bytes, kind: DataSet) -> Source:
     kinds = {(share.array.kind, share.array.attributes.get("NumberOfComponents")) for share in shares}
     if kinds not in (set(), {("f4", "3")}, {("f8", "3")}):
         raise ReadError("is not a readable VTK file: its points are not three Float32, or three Float64, each")
+    numbers = [file.numbers(share.array, share.size).read() for share in shares]
     cells = kind.cells(file, pieces)
     if any(file.shares(share.array) for share in (*shares, *cells.shares)):
         raise ReadError("has points or vertices that share their bytes with another array, which meshfix does not read")
-    numbers = [file.numbers(share.array, share.size).read() for share in shares]
     points = np.concatenate(numbers or [np.empty(0)]).reshape(-1, 3)
     old = re.match(r"[01](?!\d)|2\.0", file.root.attributes.get("version", "0.1")) is not None
     found = runs(cells.types, cells.offsets, cells.connectivity, old)

@@ -72,7 +72,20 @@ OWN = {
         "1, 2 and 4.1, text and binary, in one file or several; parameters (u, v) of nodes stay as they are",
         "physical groups; in version 1 also entities",
     ),
-    "pvtu": Own("vtk.pvtu", recognise.pvtu, {".pvtu": "pvtu"}, "VTK", "with its pieces, which are `.vtu`", _VTK_GROUPS),
+    "pvtu": Own(
+        "vtk.pvtu", recognise.names_pieces("PUnstructuredGrid", "pvtu"), {".pvtu": "pvtu"}, "VTK",
+        "with its pieces, which are `.vtu`", _VTK_GROUPS,
+    ),
+    "pvtp": Own(
+        "vtk.pvtu", recognise.names_pieces("PPolyData", "pvtp"), {".pvtp": "pvtp"}, "VTK",
+        "with its pieces, which are `.vtp`", _VTK_GROUPS,
+    ),
+    "vtm": Own(
+        "vtk.vtm",
+        recognise.names_pieces("vtkMultiBlockDataSet|vtkPartitionedDataSet(?:Collection)?|Collection", "vtm"),
+        dict.fromkeys((".vtm", ".vtmb", ".vtpc", ".vtpd", ".pvd"), "vtm"), "VTK",
+        "with its blocks, which are `.vtu`, `.vtp` and `.vts`; one step in time", f"blocks; {_VTK_GROUPS}",
+    ),
     "vtu": Own(
         "vtk.vtu", recognise.of_vtk("UnstructuredGrid", "vtu"), {".vtu": "vtu"}, "VTK",
         "text, base64, appended; uncompressed, zlib, lz4, lzma", _VTK_GROUPS, _LZ4,

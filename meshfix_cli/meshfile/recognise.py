@@ -108,9 +108,9 @@ def vts(data: bytes, text: str) -> Format | None:
     return of_vtk("StructuredGrid", "vts")(data, text)
 
 
-def pvtu(_: bytes, text: str) -> Format | None:
-    """Recognise the type of the data set."""
-    return Format("pvtu") if _is_xml(text) and _vtk_xml(text, "PUnstructuredGrid") else None
+def names_pieces(kind: str, form: str) -> Callable[[bytes, str], Format | None]:
+    """Return what recognises an XML file of VTK that names others."""
+    return lambda _, text: Format(form) if _is_xml(text) and _vtk_xml(text, f"(?:{kind})") else None
 
 
 def su2(_: bytes, text: str) -> Format | None:

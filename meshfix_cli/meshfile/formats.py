@@ -156,6 +156,10 @@ OWN = {
         "netCDF of every form; one piece of a decomposition (`.e.4.0`) alone; polygons and polyhedra are held",
         "blocks; sets of nodes, sides and elements", "`h5py`, where it is netCDF-4",
     ),
+    "exotxt": Own(
+        "exodus.exotxt", recognise.exotxt, dict.fromkeys((".exotxt", ".g"), "exotxt"), "Exodus II as text",
+        "what `exotxt` of SEACAS makes of a file; steps in time stay", "blocks; sets of nodes and sides",
+    ),
     "cgns": Own(
         "cgns", recognise.cgns, {".cgns": "cgns"}, "CGNS",
         "of HDF5, one base; sections, and blocks of points; zones are joined by their interfaces, else where their "

@@ -150,6 +150,11 @@ def exodus(data: bytes, text: str) -> Format | None:
     return in_hdf5(b"floating_point_word_size", "exodus")(data, text)
 
 
+def exotxt(_: bytes, text: str) -> Format | None:
+    """Recognise the first heading."""
+    return Format("exotxt") if text.startswith("! Database Title") else None
+
+
 def cgns(data: bytes, text: str) -> Format | None:
     """Recognise the name of a node in HDF5, or what was there before HDF5."""
     old = data[4:24] == b"ADF Database Version"  # what CGNS had before HDF5

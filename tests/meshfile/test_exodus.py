@@ -347,7 +347,7 @@ def test_what_is_no_mesh(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("text", "name"),
-    [("! Database Title\ncubit\n", "exotxt"), ("    1  400  401  880\n    1  400\n 0.1E+00 0.0\n", "MOVIE.BYU")],
+    [("    1  400  401  880\n    1  400\n 0.1E+00 0.0\n", "MOVIE.BYU")],
 )
 def test_other_files_of_that_extension(text: str, name: str, tmp_path: Path) -> None:
     (tmp_path / "a.g").write_text(text)

@@ -16,7 +16,7 @@ ENDLESS = ("tecplot", "wkt")  # meshio reads truncated files of these for ever
 BOTH = ("gmsh", "gmsh22", "ply", "stl", "vtk", "vtk42", "vtu")  # written as text or binary
 
 
-DRAWINGS = ("obj", "off", "ply", "stl")  # these have no plane meshes, and their faces need not be elements
+DRAWINGS = ("byu", "obj", "off", "ply", "stl")  # these have no plane meshes, and their faces need not be elements
 PARTS = Format("gmsh parts")  # several files of gmsh
 
 
@@ -213,6 +213,10 @@ OWN = {
     "gambit": Own(
         "gambit", recognise.gambit, {".neu": "gambit"}, "Gambit",
         "neutral files; solids of 13, 15 and 20 nodes are held", "groups; boundary conditions, whose faces are held",
+    ),
+    "byu": Own(
+        "byu", recognise.byu, {".byu": "byu", ".g": "byu"}, "MOVIE.BYU",
+        "in columns and without; polygons of five points or more are held", "parts",
     ),
     "fluent": Own(
         "fluent", recognise.fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",

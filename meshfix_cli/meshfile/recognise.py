@@ -232,5 +232,19 @@ def fluent(_: bytes, text: str) -> Format | None:
     return Format("fluent") if re.match(r"\(\s*\d+\s+[\"'(\d]", text) else None
 
 
+def byu(_: bytes, text: str) -> Format | None:
+    """Recognise four counts, the ranges of polygons of as many parts as the first says, and a coordinate."""
+    words = text[:4000].split()
+    counts = [int(word) for word in words[:4] if re.fullmatch(r"\d{1,9}", word)]
+    if len(counts) < 4 or not 1 <= counts[0] <= 200 or counts[3] < counts[2]:
+        return None
+    ranges = words[4 : 4 + 2 * counts[0]]
+    if len(ranges) < 2 * counts[0] or not all(re.fullmatch(r"\d{1,9}", word) for word in ranges):
+        return None
+    pairs = zip(map(int, ranges[::2]), map(int, ranges[1::2]), strict=True)
+    inside = all(1 <= first <= last <= counts[2] for first, last in pairs)
+    return Format("byu") if inside and "." in "".join(words[4 + 2 * counts[0] :][:1]) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -28,20 +28,17 @@ from meshfix_cli.meshfile.tables import Int64, check_blank, in_columns, right_al
 from meshfix_cli.meshfile.text import in_line, integers_at
 
 _COUNTS = re.compile(
-    rb"(?m)^!\s*Database initial variables[^\n]*\n\s*([123])[ \t][^\n]*\n\s*(\d{1,18})\s+(\d{1,18})\s+(\d{1,9})(?!\d)"
+    rb"\n!\s*Database initial variables[^\n]*\n\s*([123])[ \t][^\n]*\n\s*(\d{1,18})\s+(\d{1,18})\s+(\d{1,9})(?!\d)"
 )
-_COORDINATES = re.compile(rb"(?m)^!\s*Coordinates\b[^\n]*\n")
-_NUMBERS = re.compile(rb"(?m)^!\s*Element number map[^\n]*\n\s*explicit map[^\n]*\n")
+_COORDINATES = re.compile(rb"\n!\s*Coordinates\b[^\n]*\n")
+_NUMBERS = re.compile(rb"\n!\s*Element number map[^\n]*\n\s*explicit map[^\n]*\n")
 _BLOCK = re.compile(
-    rb"(?m)^!\s*Element block[^\n]*\n[ \t]*(\d{1,18})[ \t]+(\d{1,18})[ \t]*([^!\s]*)[^\n]*\n"
+    rb"\n!\s*Element block[^\n]*\n[ \t]*(\d{1,18})[ \t]+(\d{1,18})[ \t]*([^!\s]*)[^\n]*\n"
     rb"[ \t]*(\d{1,9})[ \t]+\d+[^\n]*\n(?:!\s*Connectivity[^\n]*\n)?"
 )
-_NODES = re.compile(rb"(?m)^!\s*Nodal point set[^\n]*\n[ \t]*(\d{1,18})[ \t]+(\d{1,18})[^\n]*\n")
-_SIDES = re.compile(
-    rb"(?m)^[ \t]*(\d{1,18})[ \t]+(\d{1,18})[ \t]+\d+[ \t]+\d+[ \t]*!\s*ID, #sides[^\n]*\n"
-    rb"!\s*Elements and sides[^\n]*\n"
-)
-_HEADING = re.compile(rb"(?m)^!|\Z")
+_NODES = re.compile(rb"\n!\s*Nodal point set[^\n]*\n[ \t]*(\d{1,18})[ \t]+(\d{1,18})[^\n]*\n")
+_SIDES = re.compile(rb"\n!\s*Elements and sides[^\n]*\n")
+_SIDE_SET = re.compile(rb"[ \t]*(\d{1,18})[ \t]+(\d{1,18})[ \t]")
 
 
 def parse(data: bytes) -> Source:
@@ -138,9 +135,13 @@ def _node_sets(data: bytes) -> Iterator[tuple[int, dict[str, _Table]]]:
 
 
 def _side_sets(data: bytes) -> Iterator[tuple[int, dict[str, _Table]]]:
+    """Their numbers, and those of their sides, stand in the line before the heading."""
     for one in _SIDES.finditer(data):
-        listed = integers_at(data, _rows(data, one.end(), int(one[2]), 2))
-        yield int(one[1]), {"elem_ss": _Table(listed[:, 0]), "side_ss": _Table(listed[:, 1])}
+        head = _SIDE_SET.match(data, data.rfind(b"\n", 0, one.start()) + 1, one.start())
+        if head is None:
+            raise in_line(data, one.start(), "a set of sides has no number, or not the number of its sides")
+        listed = integers_at(data, _rows(data, one.end(), int(head[2]), 2))
+        yield int(head[1]), {"elem_ss": _Table(listed[:, 0]), "side_ss": _Table(listed[:, 1])}
 
 
 def _rows(data: bytes, begin: int, count: int, columns: int) -> Int64:
@@ -155,5 +156,5 @@ def _rows(data: bytes, begin: int, count: int, columns: int) -> Int64:
 
 def _end(data: bytes, begin: int) -> int:
     """Return where the next heading begins, or the file ends."""
-    found = _HEADING.search(data, begin)
-    return found.start() if found else len(data)
+    found = data.find(b"\n!", begin - 1)
+    return found + 1 if found >= 0 else len(data)

@@ -19,7 +19,7 @@ from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, alike, check_blank, in_columns
-from meshfix_cli.meshfile.text import Spans, integers_at
+from meshfix_cli.meshfile.text import Spans, integers_at, unmarked
 
 _COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})\s+(\d{1,18})\s+(\d{1,18})(?!\S)")
 _TYPES = {1: "vertex", 2: "line", 3: "triangle", 4: "quad"}
@@ -29,13 +29,14 @@ _LEAST = 8  # columns that a number needs
 
 def parse(data: bytes) -> Source:
     """Read points and polygons; parts are regions where there are several."""
-    counts = _COUNTS.match(data)
+    text = unmarked(data)
+    counts = _COUNTS.match(text)
     if counts is None:
         raise ReadError("is not a readable file of MOVIE.BYU: it does not begin with four counts")
     parts, n, m, size = (int(word) for word in counts.groups())
     if 2 * parts + 3 * n + size > len(data):
         raise ReadError(f"is truncated: {counted(n, 'point', 'points')} announced, and not all are there")
-    words = _words(data, counts.end())
+    words = _words(text, counts.end())
     if len(words) < 2 * parts + 3 * n + size:
         raise ReadError(f"is truncated: {counted(n, 'point', 'points')} announced, and not all numbers are there")
     behind = 2 * parts + 3 * n + size

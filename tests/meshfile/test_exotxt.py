@@ -66,6 +66,16 @@ def test_lines_that_were_wrapped() -> None:
     assert source.points.tolist() == POINTS.tolist()
 
 
+def test_a_number_never_touches_the_one_before_it() -> None:
+    """A blank that lacks somewhere leaves a field that begins where the number before it ends."""
+    text = SQUARE.replace("   1.0000000E+00   0.0000000E+00\n", "   1.0000000E+00  0.0000000E+00\n", 1)
+    assert text != SQUARE
+    source = parse(text.encode())
+    moved = source.points + 1 / 3
+    assert source.layout is not None
+    np.testing.assert_allclose(parse(source.layout.rewritten(source.points, moved, {})).points, moved, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [

@@ -19,8 +19,6 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
 # How a file begins, and where its extension must help to tell.
 _FOREIGN = (
     ("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),
-    ("exotxt", r"! Database Title", ""),
-    ("MOVIE.BYU", r"\d+ +\d+ +\d+ +\d+\s*\n\s*\d+ +\d+", ".g"),
     ("FreeFEM", rf"\d+ +\d+ +\d+\s*\n\s*(?:{_NUMBER}\s+){{2,3}}\d+\s*\n", ".msh"),
 )
 

@@ -16,7 +16,7 @@ ENDLESS = ("tecplot", "wkt")  # meshio reads truncated files of these for ever
 BOTH = ("gmsh", "gmsh22", "ply", "stl", "vtk", "vtk42", "vtu")  # written as text or binary
 
 
-DRAWINGS = ("obj", "off", "ply", "stl")  # these have no plane meshes, and their faces need not be elements
+DRAWINGS = ("byu", "obj", "off", "ply", "stl")  # these have no plane meshes, and their faces need not be elements
 PARTS = Format("gmsh parts")  # several files of gmsh
 
 
@@ -57,6 +57,7 @@ class Own:
 # By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
 # in which each element has its group: meshio's writer of 4.1 has one for each run of them.
 _VTK_GROUPS = "cell data that are called like a material"
+_LZ4 = "`lz4`, where numbers are compressed so"
 OWN = {
     "stl": Own(
         "stl", recognise.stl, {".stl": "stl"}, "STL",
@@ -64,25 +65,56 @@ OWN = {
     ),
     "vtk": Own(
         "vtk.legacy", recognise.vtk, {".vtk": "vtk"}, "VTK",
-        "1.0 to 5.1, text and binary, unstructured grids and polygons", _VTK_GROUPS,
+        "1.0 to 5.1, text and binary, unstructured and structured grids, and polygons", _VTK_GROUPS,
     ),
     "gmsh": Own(
         "gmsh", recognise.gmsh, {".msh": "gmsh22"}, "gmsh",
         "1, 2 and 4.1, text and binary, in one file or several; parameters (u, v) of nodes stay as they are",
         "physical groups; in version 1 also entities",
     ),
-    "pvtu": Own("vtk.pvtu", recognise.pvtu, {".pvtu": "pvtu"}, "VTK", "with its pieces, which are `.vtu`", _VTK_GROUPS),
+    "pvtu": Own(
+        "vtk.pvtu", recognise.names_pieces("PUnstructuredGrid", "pvtu"), {".pvtu": "pvtu"}, "VTK",
+        "with its pieces, which are `.vtu`", _VTK_GROUPS,
+    ),
+    "pvtp": Own(
+        "vtk.pvtu", recognise.names_pieces("PPolyData", "pvtp"), {".pvtp": "pvtp"}, "VTK",
+        "with its pieces, which are `.vtp`", _VTK_GROUPS,
+    ),
+    "vtm": Own(
+        "vtk.vtm",
+        recognise.names_pieces("vtkMultiBlockDataSet|vtkPartitionedDataSet(?:Collection)?|Collection", "vtm"),
+        dict.fromkeys((".vtm", ".vtmb", ".vtpc", ".vtpd", ".pvd"), "vtm"), "VTK",
+        "with its blocks, which are `.vtu`, `.vtp` and `.vts`; one step in time", f"blocks; {_VTK_GROUPS}",
+    ),
     "vtu": Own(
-        "vtk.vtu", recognise.vtu, {".vtu": "vtu"}, "VTK",
-        "text, base64, appended; uncompressed, zlib, lz4, lzma", _VTK_GROUPS, "`lz4`, where numbers are compressed so",
+        "vtk.vtu", recognise.of_vtk("UnstructuredGrid", "vtu"), {".vtu": "vtu"}, "VTK",
+        "text, base64, appended; uncompressed, zlib, lz4, lzma", _VTK_GROUPS, _LZ4,
+    ),
+    "vtp": Own(
+        "vtk.vtp", recognise.of_vtk("PolyData", "vtp"), {".vtp": "vtp"}, "VTK",
+        "as `.vtu`; strips of triangles are held", _VTK_GROUPS, _LZ4,
+    ),
+    "vts": Own(
+        "vtk.vts", recognise.vts, {".vts": "vts"}, "VTK",
+        "as `.vtu`, of one piece; no grids without coordinates for each point (`.vti`, `.vtr`)", _VTK_GROUPS, _LZ4,
+    ),
+    "vtkhdf": Own(
+        "vtk.vtkhdf", recognise.in_hdf5(b"VTKHDF", "vtkhdf"), {".vtkhdf": "vtkhdf"}, "VTK",
+        "in HDF5, unstructured grids and polydata in parts, and blocks of them; steps in time of one mesh",
+        _VTK_GROUPS + "; blocks", "`h5py`",
     ),
     "ply": Own(
         "ply", recognise.ply, {".ply": "ply"}, "PLY",
         "text and binary; normals of the facets that moved are computed again", "none",
     ),
     "medit": Own(
-        "medit", recognise.medit, {".mesh": "medit"}, "MEDIT",
-        "text; required vertices and edges, and corners, are held", "references",
+        "medit.text", recognise.medit, {".mesh": "medit"}, "MEDIT",
+        "text; required vertices and edges, and corners, are held, and so are solids of second order whose order of "
+        "nodes the file does not give", "references",
+    ),
+    "meshb": Own(
+        "medit.binary", recognise.meshb, {".meshb": "meshb"}, "MEDIT",
+        "binary, versions 1 to 4, of either order of bytes; what is held, as in `.mesh`", "references",
     ),
     "lsdyna": Own(
         "lsdyna", recognise.lsdyna, dict.fromkeys((".k", ".key", ".dyn"), "lsdyna"), "LS-DYNA",
@@ -123,6 +155,10 @@ OWN = {
         "exodus", recognise.exodus, dict.fromkeys((".e", ".exo", ".ex2", ".exii", ".g", ".gen"), "exodus"), "Exodus II",
         "netCDF of every form; one piece of a decomposition (`.e.4.0`) alone; polygons and polyhedra are held",
         "blocks; sets of nodes, sides and elements", "`h5py`, where it is netCDF-4",
+    ),
+    "exotxt": Own(
+        "exodus.exotxt", recognise.exotxt, dict.fromkeys((".exotxt", ".g"), "exotxt"), "Exodus II as text",
+        "what `exotxt` of SEACAS makes of a file; steps in time stay", "blocks; sets of nodes and sides",
     ),
     "cgns": Own(
         "cgns", recognise.cgns, {".cgns": "cgns"}, "CGNS",
@@ -178,6 +214,10 @@ OWN = {
         "gambit", recognise.gambit, {".neu": "gambit"}, "Gambit",
         "neutral files; solids of 13, 15 and 20 nodes are held", "groups; boundary conditions, whose faces are held",
     ),
+    "byu": Own(
+        "byu", recognise.byu, {".byu": "byu", ".g": "byu"}, "MOVIE.BYU",
+        "in columns and without; polygons of five points or more are held", "parts",
+    ),
     "fluent": Own(
         "fluent", recognise.fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",
         "text and binary; other polyhedra and polygons are held", "zones of cells and of faces",
@@ -229,7 +269,7 @@ def writers() -> tuple[str, ...]:
     import meshio
 
     both = set(meshio._helpers._writer_map) & set(meshio._helpers.reader_map)
-    return tuple(sorted(both - {"tetgen", *ENDLESS} | {"gmsh22", "vtk42"}))
+    return tuple(sorted(both - {"tetgen", *ENDLESS} | {"gmsh22", "vtk42", "meshb"}))
 
 
 def options(form: Format) -> dict[str, object]:

@@ -89,8 +89,11 @@ def read(
 _OTHERS = {".node": ".ele", ".ele": ".node", ".header": ".nodes", ".nodes": ".header", ".elements": ".header"}
 
 
+_INDICES = {"pvtu": "Index", "pvtp": "Index", "vtm": "Blocks"}  # by the formats of files that name pieces
+
+
 def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
-    """Return where the files are that a `.pvtu`, a `.foam` or one of two files stands for, and those of an output.
+    """Return where the files are that an index of VTK, a `.foam` or one of two files stand for, and an output's.
 
     None of what cannot be read.
     """
@@ -100,12 +103,11 @@ def pieces_of(source: str, target: str) -> tuple[list[str], list[str]]:
         return [str(here.parent / points)], [str(there.parent / points)]
     if other := _OTHERS.get(suffix):
         return [str(here.with_suffix(other))], [str(there.with_suffix(other))]
-    if suffix != ".pvtu":
+    name = next((name for name in _INDICES if suffix in formats.OWN[name].extensions), None)
+    if name is None:
         return [], []
-    from meshfix_cli.meshfile.vtk.pvtu import Index
-
     try:
-        index = Index.of(Path(source).read_bytes(), Path(source))
+        index = _index(name).of(Path(source).read_bytes(), Path(source))
         return [str(path) for path in index.paths], index.targets(target)
     except (OSError, MeshfixError):
         return [], []
@@ -133,15 +135,18 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
         raise ReadError("the format is not recognised")
     # A pipe can be read only once, and nobody but this package looks into what is compressed.
     beside = path if path is not None and (folder or path.is_file()) and packed is None else None
-    if form.name == "pvtu":
+    if form.name in _INDICES:
         _refuse_packed(packed)
-        from meshfix_cli.meshfile.vtk.pvtu import Index
-
-        return _open_pieces(Index.of(data, beside), double, threads)
+        return _open_pieces(_index(form.name).of(data, beside), double, threads)
     source = parse(data, form, beside)
     if double and source.points.dtype != np.float64:
         source = _promoted(data, form, beside)
     return source if packed is None else replace(source, packed=packed), form
+
+
+def _index(name: str) -> Any:
+    """Return the class of files that name the pieces of a mesh."""
+    return getattr(_module(Format(name)), _INDICES[name])
 
 
 def _refuse_packed(packed: bytes | None) -> None:

@@ -52,6 +52,12 @@ def medit(_: bytes, text: str) -> Format | None:
     return Format("medit") if re.match(r"(#.*\n\s*)*MeshVersionFormatted\b", text) else None
 
 
+def meshb(data: bytes, _: str) -> Format | None:
+    """Recognise the number 1, a version, and the keyword of the dimension."""
+    head = rb"\x01\0\0\0[\x01-\x04]\0\0\0\x03\0\0\0|\0\0\0\x01\0\0\0[\x01-\x04]\0\0\0\x03"
+    return Format("meshb") if re.match(head, data) else None
+
+
 def obj(_: bytes, text: str) -> Format | None:
     """Recognise a vertex behind a comment, a name or a material."""
     vertices = re.search(r"^v[ \t]+[-+.\d]", text, re.MULTILINE)
@@ -84,16 +90,27 @@ def _vtk_xml(text: str, kind: str) -> bool:
     return re.search(rf"<VTKFile[^>]*\stype\s*=\s*[\"']{kind}", text) is not None
 
 
-def vtu(_: bytes, text: str) -> Format | None:
-    """Recognise the type of the data set."""
-    if not (_is_xml(text) and _vtk_xml(text, "UnstructuredGrid")):
-        return None
-    return Format("vtu", re.search(r"format\s*=\s*[\"']ascii", text) is None)
+def of_vtk(kind: str, form: str) -> Callable[[bytes, str], Format | None]:
+    """Return what recognises an XML file of VTK by the type of its data set."""
+
+    def recognise(_: bytes, text: str) -> Format | None:
+        if not (_is_xml(text) and _vtk_xml(text, kind)):
+            return None
+        return Format(form, re.search(r"format\s*=\s*[\"']ascii", text) is None)
+
+    return recognise
 
 
-def pvtu(_: bytes, text: str) -> Format | None:
-    """Recognise the type of the data set."""
-    return Format("pvtu") if _is_xml(text) and _vtk_xml(text, "PUnstructuredGrid") else None
+def vts(data: bytes, text: str) -> Format | None:
+    """Recognise structured grids, and those without points, which are refused by their names."""
+    if _is_xml(text) and _vtk_xml(text, "P?(?:ImageData|RectilinearGrid)"):
+        return Format("vts")
+    return of_vtk("StructuredGrid", "vts")(data, text)
+
+
+def names_pieces(kind: str, form: str) -> Callable[[bytes, str], Format | None]:
+    """Return what recognises an XML file of VTK that names others."""
+    return lambda _, text: Format(form) if _is_xml(text) and _vtk_xml(text, f"(?:{kind})") else None
 
 
 def su2(_: bytes, text: str) -> Format | None:
@@ -131,6 +148,11 @@ def exodus(data: bytes, text: str) -> Format | None:
     if data[:4] in (b"CDF\1", b"CDF\2", b"CDF\5"):
         return Format("exodus")
     return in_hdf5(b"floating_point_word_size", "exodus")(data, text)
+
+
+def exotxt(_: bytes, text: str) -> Format | None:
+    """Recognise the first heading."""
+    return Format("exotxt") if text.startswith("! Database Title") else None
 
 
 def cgns(data: bytes, text: str) -> Format | None:
@@ -208,6 +230,20 @@ def gambit(_: bytes, text: str) -> Format | None:
 def fluent(_: bytes, text: str) -> Format | None:
     """Recognise the first section by its number."""
     return Format("fluent") if re.match(r"\(\s*\d+\s+[\"'(\d]", text) else None
+
+
+def byu(_: bytes, text: str) -> Format | None:
+    """Recognise four counts, the ranges of polygons of as many parts as the first says, and a coordinate."""
+    words = text[:4000].split()
+    counts = [int(word) for word in words[:4] if re.fullmatch(r"\d{1,9}", word)]
+    if len(counts) < 4 or not 1 <= counts[0] <= 200 or counts[3] < counts[2]:
+        return None
+    ranges = words[4 : 4 + 2 * counts[0]]
+    if len(ranges) < 2 * counts[0] or not all(re.fullmatch(r"\d{1,9}", word) for word in ranges):
+        return None
+    pairs = zip(map(int, ranges[::2]), map(int, ranges[1::2]), strict=True)
+    inside = all(1 <= first <= last <= counts[2] for first, last in pairs)
+    return Format("byu") if inside and "." in "".join(words[4 + 2 * counts[0] :][:1]) else None
 
 
 def _is_xml(text: str) -> bool:

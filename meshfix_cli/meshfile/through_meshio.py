@@ -41,7 +41,7 @@ _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
 _OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _TAGS = ("gmsh:physical", "gmsh:geometrical")
-_MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref"}
+_MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref", "meshb": "medit:ref"}
 # Of the elements of one shape meshio names a rigid one, one with the pressure of pores, a hybrid one; some it invents.
 _PLAIN = {
     "abaqus": {
@@ -97,7 +97,7 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
                 _sentences(WriteError, f"cannot be written as {form.name}", path, _failing(types, points)),
                 _clock_stopped(form),
             ):
-                meshio.write(path, _mesh(source, points, arrays, kept, form), form.name, **formats.options(form))
+                _write(path, _mesh(source, points, arrays, kept, form), form)
             break
         except WriteError as error:
             last = str(error)
@@ -109,6 +109,15 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
     if form.name in _PLAIN:
         plain = _PLAIN[form.name]
         path.write_bytes(re.sub(_NAMES[form.name], lambda name: plain.get(name[0], name[0]), path.read_bytes()))
+
+
+def _write(path: Path, mesh: meshio.Mesh, form: Format) -> None:
+    if form.name == "meshb":  # the name of the file tells meshio that it is binary
+        there = path.with_name("binary.meshb")
+        meshio.write(there, mesh, "medit")
+        there.replace(path)
+    else:
+        meshio.write(path, mesh, form.name, **formats.options(form))
 
 
 @contextlib.contextmanager
@@ -165,7 +174,7 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
         return array
 
     cell = {name(key, True): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
-    if form.reader == "medit":  # any integers would be taken for references
+    if form.reader in ("medit", "meshb"):  # any integers would be taken for references
         cell = {key: runs for key, runs in cell.items() if key == material}
     sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(

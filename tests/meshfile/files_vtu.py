@@ -77,10 +77,12 @@ def by_vtk(
     assert writer.Write()
 
 
-def with_comments(path: Path, maker: Callable[[Path], None], newline: bytes = b"\n") -> None:
+def with_comments(
+    path: Path, maker: Callable[[Path], None], newline: bytes = b"\n", mark: bytes = b"<UnstructuredGrid>"
+) -> None:
     """Some programs sign what they write."""
     maker(path)
-    data = path.read_bytes().replace(b"<UnstructuredGrid>", b"<!-- made by\n     hand -->\n  <UnstructuredGrid>", 1)
+    data = path.read_bytes().replace(mark, b"<!-- made by\n     hand -->\n  " + mark, 1)
     path.write_bytes(data.replace(b"\n", newline))
 
 

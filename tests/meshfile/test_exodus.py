@@ -345,16 +345,6 @@ def test_what_is_no_mesh(tmp_path: Path) -> None:
         read(tmp_path / "c.e")
 
 
-@pytest.mark.parametrize(
-    ("text", "name"),
-    [("! Database Title\ncubit\n", "exotxt"), ("    1  400  401  880\n    1  400\n 0.1E+00 0.0\n", "MOVIE.BYU")],
-)
-def test_other_files_of_that_extension(text: str, name: str, tmp_path: Path) -> None:
-    (tmp_path / "a.g").write_text(text)
-    with pytest.raises(ReadError, match=f"is a file of {name}, which meshfix does not read"):
-        read(tmp_path / "a.g")
-
-
 def test_a_piece_of_a_decomposition_is_read_alone(tmp_path: Path) -> None:
     (tmp_path / "mesh.e.4.0").write_bytes(made("cubit.exo", tmp_path))
     document = read(tmp_path / "mesh.e.4.0")

@@ -14,7 +14,9 @@ from functools import cache, partial
 from pathlib import Path
 
 import files_openfoam
+import files_pvtp
 import files_tetgen
+import files_vtm
 import numpy as np
 import pytest
 from files_pvtu import slabs, split
@@ -134,6 +136,16 @@ def pvtu(folder: Path) -> str:
     return "in.pvtu"
 
 
+def pvtp(folder: Path) -> str:
+    files_pvtp.split(folder / "in.pvtp")
+    return "in.pvtp"
+
+
+def vtm(folder: Path) -> str:
+    files_vtm.by_vtk(folder / "in.vtm")
+    return "in.vtm"
+
+
 def xdmf(folder: Path) -> str:
     stored(folder)
     return "in.xdmf"
@@ -152,6 +164,8 @@ def openfoam(folder: Path, binary: bool = False) -> str:
 
 SEVERAL: dict[str, Callable[[Path], str]] = {
     "pvtu": pvtu,
+    "pvtp": pvtp,
+    "vtm": vtm,
     "xdmf": xdmf,
     "tetgen": tetgen,
     "openfoam": openfoam,

@@ -10,7 +10,7 @@ from files_medit import FILES, interior, read_independently, surface
 from shapes import block, plate
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.medit import parse, promoted
+from meshfix_cli.meshfile.medit.text import parse, promoted
 from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
@@ -162,8 +162,6 @@ def test_a_plane_file_has_points_of_the_plane(tmp_path: Path) -> None:
 def test_nodes_whose_order_is_not_known() -> None:
     more = b"HexahedraQ2 1 " + b"1 " * 28 + b"TetrahedraP3 1 " + b"2 " * 21 + b"End"
     assert [run.type for run in parsed(SMALL.replace(b"End", more)).cells[1:]] == ["hexahedron_of_27", "tetra_of_20"]
-    with pytest.raises(ReadError, match=r"gives nodes an order of its own \(TrianglesP2Ordering\), which meshfix does"):
-        parse(SMALL.replace(b"End", b"TrianglesP2Ordering 1 2 0\nEnd"))
 
 
 def test_cells_of_higher_order_and_old_names() -> None:
@@ -178,7 +176,6 @@ def test_cells_of_higher_order_and_old_names() -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (b"\1\0\0\0\2\0\0\0", "binary"),
         (SMALL.replace(b"Formatted 2", b"Formatted 7"), "known version"),
         (SMALL.replace(b"Dimension 2", b"Dimension 4"), "its dimension is 4"),
         (SMALL.replace(b"Dimension 2", b""), "does not stand before"),

@@ -271,7 +271,7 @@ def broken(folder: Path, what: str) -> Path:
     ("what", "said"),
     [
         ("missing", "in.pvtu: in_1.vtu: No such file or directory"),
-        ("ids that are no integers", "in_1.vtu: is not a readable vtu file: its array 'ids' does not hold integers"),
+        ("ids that are no integers", "in_1.vtu: is not a readable VTK file: its array 'ids' does not hold integers"),
         ("nothing in it", "in_1.vtu: is empty"),
         ("truncated", "in_1.vtu: is truncated: it does not end with </VTKFile>"),
         ("of another type", "in_1.vtu: is a piece, and not a .vtu file of an unstructured grid"),

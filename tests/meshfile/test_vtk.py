@@ -234,12 +234,11 @@ def test_data_of_polydata_count_the_lines_first(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "data",
     [
-        text("DIMENSIONS 2 2 1\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 1 1 0", "STRUCTURED_GRID"),
         fan(kind="int"),
         fan(kind="vtktypeint64"),
         fan().replace(b"3.0", b"6.0"),
     ],
-    ids=["structured grid", "int", "int64", "version 6"],
+    ids=["int", "int64", "version 6"],
 )
 def test_what_is_left_to_meshio(data: bytes) -> None:
     assert vtk.parse(data) is None

@@ -275,7 +275,7 @@ def test_vertices_of_ghost_cells_are_held(tmp_path: Path) -> None:
 def test_other_kinds_of_files_are_refused(old: bytes, new: bytes, tmp_path: Path) -> None:
     data = made("raw_double.vtu", tmp_path)
     assert old in data
-    with pytest.raises(ReadError, match=r"no unstructured grid|not three Float32"):
+    with pytest.raises(ReadError, match=r"no UnstructuredGrid|not three Float32"):
         vtu.parse(data.replace(old, new))
 
 

@@ -14,7 +14,7 @@ from meshfix_cli import read, untangle, write
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import OWN
 
-IN_SEVERAL_FILES = ("pvtu", "openfoam", "tetgen", "elmer")  # which have tables of their own
+IN_SEVERAL_FILES = ("pvtu", "pvtp", "vtm", "openfoam", "tetgen", "elmer")  # which have tables of their own
 FORMATS = tuple(name for name in OWN if name not in IN_SEVERAL_FILES)
 MODULES = {name: importlib.import_module(f"files_{name.replace('-', '_')}") for name in FORMATS}
 WORD = re.compile(rb"([^\s,\"'=<>]+)")

@@ -9,7 +9,8 @@ SEACAS, which goes on with it.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from functools import partial
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.exodus.blocks import Block, Named, Run, blocks, numbers
 from meshfix_cli.meshfile.exodus.sets import BLOCK, arrays
-from meshfix_cli.meshfile.exodus.variables import opened
+from meshfix_cli.meshfile.exodus.variables import Variables, opened
 from meshfix_cli.meshfile.hdf5 import Table
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 
@@ -33,19 +34,24 @@ _TOLD = re.compile(
 def parse(data: bytes) -> Source:
     """Read nodes, blocks, sets and fields."""
     with opened(data) as variables:
-        named = variables.named
-        table = _coordinates(named)
-        n, dimension = table.at.shape
-        found = blocks(named, dimension)
-        runs = [(block, run) for block in found for run in block.runs]
-        layout = variables.layout(table, [partial(_corners, block.table, run) for block, run in runs])
-        flat = np.concatenate([named[name].values().ravel() for name in table.sets])
-        ids = numbers(named, "elem_num_map")
-        untold = tuple(_untold(named))
+        return source_of(variables, partial(opened, data))
+
+
+def source_of(variables: Variables, again: Callable[[], AbstractContextManager[Variables]]) -> Source:
+    """Return what variables hold, which are opened again where sets and fields are asked for."""
+    named = variables.named
+    table = _coordinates(named)
+    n, dimension = table.at.shape
+    found = blocks(named, dimension)
+    runs = [(block, run) for block in found for run in block.runs]
+    layout = variables.layout(table, [partial(_corners, block.table, run) for block, run in runs])
+    flat = np.concatenate([named[name].values().ravel() for name in table.sets])
+    ids = numbers(named, "elem_num_map")
+    untold = tuple(_untold(named))
     if len(ids) != sum(block.size for block in found):
         ids = np.arange(1, sum(block.size for block in found) + 1)
     cells = [Cells(run.type, run.vertices, ids[run.rows + block.first]) for block, run in runs]
-    load = partial(_arrays, data, found, n, dimension)
+    load = partial(_arrays, again, found, n, dimension)
     return Source(np.ascontiguousarray(flat[table.at]), cells, layout, load, (BLOCK,), untold=untold)
 
 
@@ -65,8 +71,10 @@ def _corners(table: str, run: Run) -> Table:
     return Table([table], run.at())
 
 
-def _arrays(data: bytes, found: Sequence[Block], points: int, dimension: int) -> Arrays:
-    with opened(data) as variables:
+def _arrays(
+    again: Callable[[], AbstractContextManager[Variables]], found: Sequence[Block], points: int, dimension: int
+) -> Arrays:
+    with again() as variables:
         return arrays(variables.named, found, points, dimension)
 
 

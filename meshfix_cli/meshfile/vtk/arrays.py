@@ -121,7 +121,7 @@ class Text:
         except ReadError as error:
             raise ReadError(f"is truncated: its array {name!r} has less than {numbers}") from error
         if text[spans.max(initial=0) :].strip():
-            raise ReadError(f"is not a readable vtu file: its array {name!r} has more than {numbers}")
+            raise ReadError(f"is not a readable VTK file: its array {name!r} has more than {numbers}")
         return spans + self.begin
 
     def read(self) -> NDArray[Any]:
@@ -183,7 +183,7 @@ class Payload:
         text = text.translate(None, _BLANKS)
         stored = _decode(_Stream(text, 0, len(text), coding.base64, kind.name), kind.bytes, coding)
         if kind.size and stored.end != len(text):
-            raise ReadError(f"is not a readable vtu file: its array {kind.name!r} has more bytes than announced")
+            raise ReadError(f"is not a readable VTK file: its array {kind.name!r} has more bytes than announced")
         return cls(file, first, last, kind, coding, stored)
 
     @classmethod
@@ -275,7 +275,7 @@ class _Stream:
         try:
             chunk = b64decode(chunk, validate=True) if self.base64 else chunk
         except ValueError as error:
-            raise ReadError(f"is not a readable vtu file: its array {self.name!r} is not base64") from error
+            raise ReadError(f"is not a readable VTK file: its array {self.name!r} is not base64") from error
         if len(chunk) < count:
             raise ReadError(f"is truncated: its array {self.name!r} ends before it should")
         return chunk
@@ -312,7 +312,7 @@ def _decompress(stream: _Stream, number: int, size: int, coding: Coding, compres
     sizes = [block] * (number - 1) + [last or block]
     _check(stream.name, sum(sizes), size)
     if not 0 < sizes[-1] <= block:
-        raise ReadError(f"is not a readable vtu file: the last block of its array {stream.name!r} has a wrong size")
+        raise ReadError(f"is not a readable VTK file: the last block of its array {stream.name!r} has a wrong size")
     ends = list(accumulate(lengths, initial=0))
     compressed = stream.take(ends[-1])
     blocks = [compressed[first:last] for first, last in pairwise(ends)]
@@ -322,7 +322,7 @@ def _decompress(stream: _Stream, number: int, size: int, coding: Coding, compres
 
 def _check(name: str, announced: int, size: int) -> None:
     if announced != size:
-        problem = "is truncated" if announced < size else "is not a readable vtu file"
+        problem = "is truncated" if announced < size else "is not a readable VTK file"
         raise ReadError(f"{problem}: its array {name!r} has {counted(announced, 'byte', 'bytes')}, not {size:,}")
 
 
@@ -331,11 +331,11 @@ def _opened(block: bytes, size: int, compressor: Compressor, name: str) -> bytes
     try:
         body = compressor.decompress(block, size) if size <= compressor.most * len(block) else b""
     except ImportError as error:
-        raise ReadError(f"is not a readable vtu file: its compression needs the package {error.name}") from error
+        raise ReadError(f"is not a readable VTK file: its compression needs the package {error.name}") from error
     except (zlib.error, ValueError) as error:
-        raise ReadError(f"is not a readable vtu file: a block of its array {name!r} is damaged ({error})") from error
+        raise ReadError(f"is not a readable VTK file: a block of its array {name!r} is damaged ({error})") from error
     if len(body) != size:
-        raise ReadError(f"is not a readable vtu file: a block of its array {name!r} is not as long as announced")
+        raise ReadError(f"is not a readable VTK file: a block of its array {name!r} is not as long as announced")
     return body
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, counted
 from meshfix_cli.mesh.lagrange import kinds
+from meshfix_cli.meshfile.blocks import cells_of_block
 from meshfix_cli.meshfile.source import Cells, regions_among
 from meshfix_cli.meshfile.tables import alike
 
@@ -31,6 +32,10 @@ TYPES = {element.vtk: (key, element.nodes) for key, element in ELEMENTS.items() 
 # Of any order, by the number of nodes; Bezier's have nodes that lie elsewhere, and VTK knows no pyramids of these.
 _LAGRANGE = {68: "line", 69: "triangle", 70: "quad", 71: "tetra", 72: "hexahedron", 73: "wedge"}
 _HEXAHEDRON = 72
+# The types of cells that polydata do not tell: that of any number of vertices, and those of some numbers.
+POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
+    b"vertices": (2, {1: 1}), b"lines": (4, {2: 3}), b"polygons": (7, {3: 5, 4: 9}), b"triangle_strips": (6, {})
+}  # fmt: skip
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 
 
@@ -102,6 +107,29 @@ def runs(
         order = kinds()[name].order_of("vtk 8") if old and number == _HEXAHEDRON and name in kinds() else None
         found.append(Run(name, rows, vertices if order is None else vertices[:, order], order))
     return found
+
+
+def types_of_sizes(sizes: NDArray[np.int64], other: int, known: Mapping[int, int]) -> NDArray[np.int64]:
+    """Return the types of cells of which a section tells only how many vertices each has; see `POLYDATA`."""
+    types = np.full(len(sizes), other)
+    for size, kind in known.items():
+        types[sizes == size] = kind
+    return types
+
+
+def in_rows(shape: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the types, offsets and connectivity, as `runs` takes them, of a grid with points along each index."""
+    along = [size for size in shape if size > 1]
+    if not along or 0 in shape:
+        return np.empty(0, np.int64), np.zeros(1, np.int64), np.empty(0, np.int64)
+    key, vertices = cells_of_block(along)
+    types = np.full(len(vertices), ELEMENTS[key].vtk)
+    return types, np.arange(len(vertices) + 1) * vertices.shape[1], vertices.ravel()
+
+
+def no_points(kind: str) -> ReadError:
+    """Return the error for a grid whose points follow from a few numbers."""
+    return ReadError(f"holds a grid ({kind}) whose points have no coordinates of their own that could change")
 
 
 def _lagrange(family: str, size: int) -> str | None:

@@ -1,10 +1,11 @@
-"""Legacy .vtk files: unstructured grids and polydata, as text and binary, of versions 1.0 to 5.1.
+"""Legacy .vtk files: unstructured and structured grids, and polydata, as text and binary, of versions 1.0 to 5.1.
 
 Source: "VTK File Formats", section Simple Legacy Formats; what that leaves open, as VTK's own reader has it.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
@@ -18,13 +19,9 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import chain
-from meshfix_cli.meshfile.vtk.cells import TYPES, Run, markings, runs
+from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, Run, in_rows, markings, runs, types_of_sizes
 from meshfix_cli.meshfile.vtk.sections import Array, Sections, find_sections
 
-# The types of cells that polydata do not tell: that of any number of vertices, and those of some numbers.
-_POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
-    b"vertices": (2, {1: 1}), b"lines": (4, {2: 3}), b"polygons": (7, {3: 5, 4: 9}), b"triangle_strips": (6, {})
-}  # fmt: skip
 _POLYHEDRON = 42
 _OLD = re.compile(rb"(?:\xef\xbb\xbf)?\s*# vtk DataFile Version\s+(?:[0-4](?!\d)|5\.0)")
 
@@ -52,7 +49,10 @@ def parse(data: bytes) -> Source | None:
     regions, cells = markings(named, found_cells, lambda: load().cell, damaged)
     held = ghost_vertices(cells, points.tuples)
     untold = dict.fromkeys(["field data"] * bool(found.arrays[b"dataset"]) + found.untold)
-    return Source(points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold))
+    return Source(
+        points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold),
+        oriented=found.dataset != b"structured_grid",  # indices may run either way
+    )  # fmt: skip
 
 
 def promoted(data: bytes) -> bytes:
@@ -69,27 +69,35 @@ def promoted(data: bytes) -> bytes:
 class _Table(NamedTuple):
     """A section of cells: cell i is the `first + i`-th of the file and has the vertices from `offsets[i]` on.
 
-    `numbers` are the vertices as the file holds them, with `gap` (0 or 1) other numbers before each cell.
+    `numbers` are the vertices as the file holds them, with `gap` (0 or 1) other numbers before each cell;
+    None: it does not.
     """
 
     first: int
     types: Integers
     offsets: NDArray[np.int64]
     vertices: Integers
-    numbers: Array
+    numbers: Array | None
     gap: int
 
     def places(self, run: Run) -> Callable[[], Places]:
         """Return what tells where the vertices of a run stand, and keeps none of the large arrays where it is whole."""
+        numbers = self.numbers
+        if numbers is None:
+            return _not_turned
         (count, size), rows = run.vertices.shape, run.rows
         if run.order is not None:
             before = self.offsets[rows] + self.gap * (rows + 1)
-            return lambda: _places(self.numbers, lambda: before, size).at((slice(None), run.order))
+            return lambda: _places(numbers, lambda: before, size).at((slice(None), run.order))
         if count and rows[-1] - rows[0] == count - 1:
             first, step = int(self.offsets[rows[0]] + self.gap * (rows[0] + 1)), size + self.gap
-            return partial(_places, self.numbers, lambda: first + step * np.arange(count), size)
+            return partial(_places, numbers, lambda: first + step * np.arange(count), size)
         before = self.offsets[rows] + self.gap * (rows + 1)
-        return partial(_places, self.numbers, lambda: before, size)
+        return partial(_places, numbers, lambda: before, size)
+
+
+def _not_turned() -> Places:
+    raise ReadError("has points in order, and its cells cannot be renumbered one by one")
 
 
 def _places(numbers: Array, first: Callable[[], NDArray[np.int64]], size: int) -> Places:
@@ -99,8 +107,12 @@ def _places(numbers: Array, first: Callable[[], NDArray[np.int64]], size: int) -
 
 def _tables(found: Sections) -> list[_Table]:
     """The sections of cells, in the order in which VTK counts their cells."""
+    if found.dataset == b"structured_grid":
+        if found.points is None or math.prod(found.shape) != found.points.tuples or min(found.shape, default=0) < 1:
+            raise ReadError("is not a readable vtk file: its dimensions do not fit the number of its points")
+        return [_Table(0, *in_rows(found.shape), None, 0)]
     tables: list[_Table] = []
-    for keyword in _POLYDATA if found.dataset == b"polydata" else (b"cells",):
+    for keyword in POLYDATA if found.dataset == b"polydata" else (b"cells",):
         if keyword in found.cells:
             first = tables[-1].first + len(tables[-1].types) if tables else 0
             tables.append(_table(first, keyword, found))
@@ -112,7 +124,7 @@ def _tables(found: Sections) -> list[_Table]:
 def _table(first: int, keyword: bytes, found: Sections) -> _Table:
     count, where, array = found.cells[keyword]
     types, numbers = None, _integers(array)
-    if keyword not in _POLYDATA:
+    if keyword not in POLYDATA:
         if found.types is None:
             raise ReadError("is truncated: the section CELL_TYPES is missing")
         types = _integers(found.types)
@@ -124,7 +136,7 @@ def _table(first: int, keyword: bytes, found: Sections) -> _Table:
         if ends != [0, 0, len(numbers), len(numbers)]:
             raise ReadError("is not a readable vtk file: the offsets of its cells do not fit their vertices")
     if types is None:
-        types = _types(np.diff(offsets), *_POLYDATA[keyword])
+        types = types_of_sizes(np.diff(offsets), *POLYDATA[keyword])
     return _Table(first, types, offsets, numbers, array, int(where is None))
 
 
@@ -154,13 +166,6 @@ def _starts(numbers: Integers, count: int, types: Integers | None) -> NDArray[np
         if sizes.all() and ends[-1:] == len(numbers) and (numbers[ends - sizes - 1] == sizes).all():
             return ends - sizes - 1
     return chain(numbers, count, "the numbers of vertices of its cells do not add up")
-
-
-def _types(sizes: NDArray[np.int64], other: int, known: dict[int, int]) -> NDArray[np.int64]:
-    types = np.full(len(sizes), other)
-    for size, kind in known.items():
-        types[sizes == size] = kind
-    return types
 
 
 def _cells(table: _Table, run: Run, ids: NDArray[np.int64]) -> Cells:

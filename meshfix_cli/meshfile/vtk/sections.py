@@ -20,6 +20,7 @@ from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import REGIONS
 from meshfix_cli.meshfile.splice import Places
 from meshfix_cli.meshfile.text import Spans, behind_words, numbers_at, short_integers, words
+from meshfix_cli.meshfile.vtk.cells import no_points
 
 _HEAD = re.compile(
     rb"(?:\xef\xbb\xbf)?\s*# vtk DataFile Version\s+(\d{1,9})[^\n]*\n[^\n]*\n\s*(ascii|binary)\s+dataset\s+(\w+)\s",
@@ -37,6 +38,7 @@ _COMPONENTS = {
     b"vectors": 3, b"normals": 3, b"tensors": 9, b"tensors6": 6, b"global_ids": 1, b"pedigree_ids": 1, b"edge_flags": 1
 }  # fmt: skip
 _ATTRIBUTES = (b"scalars", b"color_scalars", b"lookup_table", b"texture_coordinates", *_COMPONENTS)
+_SHAPE = (b"dimensions", b"extent")
 _CELLS = (b"cells", b"vertices", b"lines", b"polygons", b"triangle_strips")
 
 
@@ -153,6 +155,8 @@ class Sections:
     points, types : Array or None
     points_kind : int
         Offset of the word that tells the type of the points.
+    shape : list of int
+        How many points stand along each index.
     cells : dict
         By the keywords of their sections, in small letters.
     arrays : dict
@@ -168,6 +172,7 @@ class Sections:
     points: Array | None = None
     points_kind: int = 0
     types: Array | None = None
+    shape: list[int] = field(default_factory=list)
     cells: dict[bytes, CellArray] = field(default_factory=dict)
     arrays: dict[bytes, list[Array]] = field(default_factory=lambda: defaultdict(list))
     untold: list[str] = field(default_factory=list)
@@ -204,9 +209,20 @@ class Sections:
             self.points = self._array(b"points", kind, 3, count)
         elif keyword == b"cell_types":
             self.types = self._array(keyword, b"int", 1, self._count())
+        elif keyword in _SHAPE and self.dataset == b"structured_grid":
+            self.shape = self._shape(keyword == b"extent")
+            return True
         elif keyword in _CELLS:
             self.cells[keyword] = self._cells(self._count(), self._count())
         return keyword in (b"points", b"cell_types", *_CELLS)
+
+    def _shape(self, ends: bool) -> list[int]:
+        """How many points there are along each index, or from which to which of these."""
+        words = [self._word() for _ in range(6 if ends else 3)]
+        if not all(re.fullmatch(rb"-?\d{1,9}", word) for word in words):
+            raise ReadError("is not a readable vtk file: it does not tell how many points stand along each index")
+        numbers = [int(word) for word in words]
+        return [last - first + 1 for first, last in zip(numbers[::2], numbers[1::2], strict=True)] if ends else numbers
 
     def _cells(self, count: int, size: int) -> CellArray:
         if self._peek() != b"offsets":
@@ -330,7 +346,7 @@ class Sections:
 
 
 def find_sections(data: bytes) -> Sections | None:
-    """Find the sections of a file; None: it is newer than version 5, or neither an unstructured grid nor polydata.
+    """Find the sections of a file; None: it is newer than version 5, or of another kind of data set.
 
     Raises
     ------
@@ -340,9 +356,12 @@ def find_sections(data: bytes) -> Sections | None:
     head = _HEAD.match(data)
     if head is None:
         raise ReadError("is not a readable vtk file: it does not begin with a version, a title, a coding and a dataset")
-    if int(head[1]) > 5 or head[3].lower() not in (b"unstructured_grid", b"polydata"):
+    dataset = head[3].lower()
+    if dataset in (b"structured_points", b"rectilinear_grid"):
+        raise no_points(dataset.decode().upper())
+    if int(head[1]) > 5 or dataset not in (b"unstructured_grid", b"polydata", b"structured_grid"):
         return None
-    found = Sections(data, head[2].lower() == b"binary", head[3].lower(), head.end())
+    found = Sections(data, head[2].lower() == b"binary", dataset, head.end())
     found.walk()
     return found
 

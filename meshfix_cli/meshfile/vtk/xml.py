@@ -78,7 +78,7 @@ class Element:
         """Return the number that an attribute holds."""
         text = self.attributes.get(attribute, "").strip(" \t\r\n")
         if not re.fullmatch("[0-9]{1,15}", text):
-            raise ReadError(f"is not a readable vtu file: the {attribute} of a {self.tag} is {text!r}")
+            raise ReadError(f"is not a readable VTK file: the {attribute} of a {self.tag} is {text!r}")
         return int(text)
 
 
@@ -119,17 +119,17 @@ class XmlFile:
         if tag is None:
             file = cls(data, *elements(data, len(data), len(data)), 0, 0)
             if file.arrays:
-                raise ReadError("is not a readable vtu file: it has no appended data")
+                raise ReadError("is not a readable VTK file: it has no appended data")
             return file
         end = data.rfind(b"</AppendedData")
         if end < tag.end():
             raise ReadError("is truncated: its appended data do not end")
         start = _UNDERSCORE.match(data, tag.end(), end)
         if start is None:
-            raise ReadError("is not a readable vtu file: its appended data do not begin with an underscore")
+            raise ReadError("is not a readable VTK file: its appended data do not begin with an underscore")
         parsed = elements(data, tag.end(), end)
         if [element.at for element in parsed[0].named("AppendedData")] != [tag.start()]:
-            raise ReadError("is not a readable vtu file: its appended data are not where they should be")
+            raise ReadError("is not a readable VTK file: its appended data are not where they should be")
         file = cls(data, *parsed, start.end(), end)
         if file._offsets and file._offsets[-1] > end - file.begin:
             raise ReadError("is truncated: its appended data end before its last array begins")
@@ -148,7 +148,7 @@ class XmlFile:
             There are more or less.
         """
         if array.kind is None:
-            raise ReadError(f"is not a readable vtu file: its array {array.name!r} does not hold numbers")
+            raise ReadError(f"is not a readable VTK file: its array {array.name!r} does not hold numbers")
         kind = Kind(array.name, array.kind, size)
         if array.appended:
             at = self.begin + array.count("offset")
@@ -165,7 +165,7 @@ class XmlFile:
         width = {"UInt32": 4, "UInt64": 8}.get(attributes.get("header_type", "UInt32"))
         name = attributes.get("compressor")
         if order is None or width is None or (name and name not in COMPRESSORS):
-            raise ReadError("is not a readable vtu file: its byte_order, header_type or compressor is not known")
+            raise ReadError("is not a readable VTK file: its byte_order, header_type or compressor is not known")
         return Coding(order, width, COMPRESSORS[name] if name else None, base64)
 
     def shares(self, array: Element) -> bool:
@@ -206,7 +206,7 @@ class XmlFile:
 
 
 def elements(
-    data: bytes, head: int, tail: int, form: str = "vtu", root: str = "VTKFile", doctype: bool = False
+    data: bytes, head: int, tail: int, form: str = "VTK", root: str = "VTKFile", doctype: bool = False
 ) -> tuple[Element, list[Element], bool]:
     """Read the elements before `head` and from `tail`: the root, those with appended arrays, and if there are comments.
 

@@ -1,0 +1,1 @@
+"""MEDIT's files, .mesh in text and .meshb in binary."""

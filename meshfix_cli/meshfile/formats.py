@@ -89,6 +89,11 @@ OWN = {
         "cards in columns of 8, 10 and 20 and between commas; degenerate solids are what they are; no file that it "
         "includes", "parts; these by their titles, and sets of nodes, elements and parts",
     ),
+    "mapdl": Own(
+        "mapdl", recognise.mapdl, {".cdb": "mapdl"}, "Ansys Mechanical",
+        "archives and input files with blocks of nodes and elements, under other names too; elements that commands "
+        "make one by one stay", "materials and types; components",
+    ),
     "abaqus": Own(
         "abaqus", recognise.abaqus, {".inp": "abaqus"}, "Abaqus",
         "parts, instances, sets, sections; files that it includes; no mesh that comes from `*NGEN` and the like",

@@ -210,5 +210,17 @@ def fluent(_: bytes, text: str) -> Format | None:
     return Format("fluent") if re.match(r"\(\s*\d+\s+[\"'(\d]", text) else None
 
 
+_MAPDL = re.compile(
+    r"(?i)(?:!.*\n\s*)*(?:/(?:COM|PREP7|BATCH|NOPR|TITLE|CLEAR|UNITS|CONFIG|GO)\b|FINI(?:SH)?\s|ET\s*,\s*\d)"
+)
+
+
+def mapdl(_: bytes, text: str) -> Format | None:
+    """Recognise the first command behind comments, or a block of nodes."""
+    lines = text.replace("\r", "\n")
+    block = re.search(r"(?im)^[ \t]*NBLOCK[ \t]*,[ \t]*\d", lines)
+    return Format("mapdl") if block or _MAPDL.match(lines) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -53,7 +53,6 @@ def _several(data: bytes, form: Format) -> str | None:
 
 # What stands once in a file of one mesh: of several, meshio reads one, or lays them over one another.
 _ONCE = {
-    "netgen": ("meshes", rb"(?m)^\s*points\s*$"),
     "permas": ("blocks of nodes", rb"(?mi)^\s*\$COOR\b"),
 }
 

@@ -183,6 +183,11 @@ OWN = {
         "gambit", recognise.gambit, {".neu": "gambit"}, "Gambit",
         "neutral files; solids of 13, 15 and 20 nodes are held", "groups; boundary conditions, whose faces are held",
     ),
+    "netgen": Own(
+        "netgen", recognise.netgen, {".vol": "netgen"}, "Netgen",
+        "all dialects of surface elements and edges; the geometry behind the mesh stays; no curved elements",
+        "domains and boundaries; these by their names",
+    ),
     "fluent": Own(
         "fluent", recognise.fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",
         "text and binary; other polyhedra and polygons are held", "zones of cells and of faces",

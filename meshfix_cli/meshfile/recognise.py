@@ -222,5 +222,10 @@ def mapdl(_: bytes, text: str) -> Format | None:
     return Format("mapdl") if block or _MAPDL.match(lines) else None
 
 
+def netgen(_: bytes, text: str) -> Format | None:
+    """Recognise the first keyword behind comments."""
+    return Format("netgen") if re.match(r"(?:#[^\r\n]*\s*)*mesh3d[ \t]*[\r\n]", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -65,14 +65,14 @@ def test_an_unmoved_mesh_comes_back_byte_for_byte_and_a_moved_one_tells_what_it_
     points, cells = block()
     valid = untangle(Mesh.build(points, cells)).after.points
     for name, coordinates in (("valid", valid), ("tangled", points)):
-        path = tmp_path / f"{name}.vol"
-        meshio.Mesh(coordinates, [("tetra", cells)]).write(path, file_format="netgen")
-        path.write_text(path.read_text().replace("endmesh", "face_colours\n1\n1 0.5 0.5 0.5\n\nendmesh"))
-    run("untangle", "-q", "--smooth", "0", tmp_path / "valid.vol", tmp_path / "out.vol")
-    assert (tmp_path / "out.vol").read_bytes() == (tmp_path / "valid.vol").read_bytes()
-    text = run("untangle", tmp_path / "tangled.vol", tmp_path / "out.vol").stdout.decode()
+        path = tmp_path / f"{name}.post"
+        meshio.Mesh(coordinates, [("tetra", cells)]).write(path, file_format="permas")
+        path.write_text(path.read_text().replace("!\n$ELEMENT", "! STEEL\n$ELEMENT"))
+    run("untangle", "-q", "--smooth", "0", tmp_path / "valid.post", tmp_path / "out.post")
+    assert (tmp_path / "out.post").read_bytes() == (tmp_path / "valid.post").read_bytes()
+    text = run("untangle", tmp_path / "tangled.post", tmp_path / "out.post").stdout.decode()
     (note,) = [line for line in text.splitlines() if "written anew" in line]
-    assert "face_colours" in {*note.partition("dropped: ")[2].split(", ")}
+    assert "STEEL" in {*note.partition("dropped: ")[2].split(", ")}
 
 
 def test_regions_of_other_formats_are_held(tmp_path: Path) -> None:

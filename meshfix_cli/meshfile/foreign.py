@@ -1,7 +1,6 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
-Source: FreeFEM documentation, "Mesh generation"; GetFEM user documentation, "Build a
-mesh".
+Source: GetFEM user documentation, "Build a mesh".
 """
 
 from __future__ import annotations
@@ -15,13 +14,11 @@ from meshfix_cli.meshfile.formats import HEAD
 from meshfix_cli.meshfile.recognise import Format
 
 MOST_BYTES = 65536  # of a data set that may be texts
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
 # How a file begins, and where its extension must help to tell.
 _FOREIGN = (
     ("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),
     ("exotxt", r"! Database Title", ""),
     ("MOVIE.BYU", r"\d+ +\d+ +\d+ +\d+\s*\n\s*\d+ +\d+", ".g"),
-    ("FreeFEM", rf"\d+ +\d+ +\d+\s*\n\s*(?:{_NUMBER}\s+){{2,3}}\d+\s*\n", ".msh"),
 )
 
 

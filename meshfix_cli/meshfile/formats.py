@@ -192,6 +192,10 @@ OWN = {
         "fluent", recognise.fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",
         "text and binary; other polyhedra and polygons are held", "zones of cells and of faces",
     ),
+    "freefem": Own(
+        "freefem", recognise.freefem, {".msh": "freefem"}, "FreeFEM",
+        "triangles in the plane and in space, and tetrahedra", "labels; those of the boundary",
+    ),
     "elmer": Own(
         "elmer", recognise.by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
         "a folder with `mesh.header`, or one of its files; not what is partitioned",

@@ -227,5 +227,25 @@ def netgen(_: bytes, text: str) -> Format | None:
     return Format("netgen") if re.match(r"(?:#[^\r\n]*\s*)*mesh3d[ \t]*[\r\n]", text) else None
 
 
+# Three counts, and two vertices of two or three coordinates and a label.
+_FREEFEM = re.compile(
+    rf"(\d+)[ \t]+(\d+)[ \t]+(\d+)[ \t]*[\r\n]\s*"
+    rf"((?:{_NUMBER}[ \t]+){{2,3}}-?\d+[ \t]*[\r\n]\s*(?:{_NUMBER}[ \t]+){{2,3}}-?\d+[ \t]*[\r\n])"
+)
+
+
+def freefem(data: bytes, text: str) -> Format | None:
+    """Recognise the counts and the first vertices; where all of these are integers, also by the number of lines."""
+    head = _FREEFEM.match(text)
+    if head is None or int(head[1]) < 3:
+        return None
+    if "." in head[4]:
+        return Format("freefem")
+    numbered = [line.split()[0] for line in head[4].split("\n" if "\n" in head[4] else "\r")[:2]]
+    elements = numbered in (["0", "1"], ["1", "2"]) and int(head[2]) in (3, 4, 6, 10)  # of TetGen or Triangle
+    breaks = max(data.count(b"\n"), data.count(b"\r"))
+    return None if elements or breaks < sum(int(head[i]) for i in (1, 2, 3)) else Format("freefem")
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -19,8 +19,6 @@ from meshfix_cli.meshfile.document import Document
 
 FOREIGN = {
     "c.mesh": ("% GETFEM MESH FILE \n% GETFEM VERSION 5.0\n\nBEGIN POINTS LIST\n", "GetFEM"),
-    "h.msh": ("4 2 4\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n1 2 3 0\n", "FreeFEM"),
-    "i.msh": ("5 2 4\n0 0 0.5 1\n1 0 0 1\n", "FreeFEM"),
 }
 
 

@@ -242,7 +242,8 @@ def freefem(data: bytes, text: str) -> Format | None:
     if "." in head[4]:
         return Format("freefem")
     numbered = [line.split()[0] for line in head[4].split("\n" if "\n" in head[4] else "\r")[:2]]
-    elements = numbered in (["0", "1"], ["1", "2"]) and int(head[2]) in (3, 4, 6, 10)  # of TetGen or Triangle
+    width = len(head[4].split()) // 2
+    elements = numbered in (["0", "1"], ["1", "2"]) and width == 1 + int(head[2]) + int(head[3])  # Triangle's
     breaks = max(data.count(b"\n"), data.count(b"\r"))
     return None if elements or breaks < sum(int(head[i]) for i in (1, 2, 3)) else Format("freefem")
 

@@ -196,6 +196,11 @@ OWN = {
         "freefem", recognise.freefem, {".msh": "freefem"}, "FreeFEM",
         "triangles in the plane and in space, and tetrahedra", "labels; those of the boundary",
     ),
+    "ugrid": Own(
+        "ugrid", recognise.ugrid, {".ugrid": "ugrid"}, "UGRID (AFLR)",
+        "text, and binary of either byte order and precision, as a stream and as records of Fortran",
+        "parts of the surface",
+    ),
     "elmer": Own(
         "elmer", recognise.by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
         "a folder with `mesh.header`, or one of its files; not what is partitioned",

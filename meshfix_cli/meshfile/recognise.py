@@ -248,5 +248,19 @@ def freefem(data: bytes, text: str) -> Format | None:
     return None if elements or breaks < sum(int(head[i]) for i in (1, 2, 3)) else Format("freefem")
 
 
+_UGRID = re.compile(rf"(?:\d+[ \t]+){{6}}\d+[ \t]*[\r\n]\s*(?:{_NUMBER}[ \t]+){{2}}{_NUMBER}[ \t]*[\r\n]")
+
+
+def ugrid(data: bytes, text: str) -> Format | None:
+    """Recognise seven counts and the first node, or a length that fits such counts."""
+    if _UGRID.match(text):
+        return Format("ugrid", False)
+    if b"\0" not in data[:64]:
+        return None
+    from meshfix_cli.meshfile.ugrid_layout import binary
+
+    return Format("ugrid", True) if binary(data) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -201,6 +201,11 @@ OWN = {
         "text, and binary of either byte order and precision, as a stream and as records of Fortran",
         "parts of the surface",
     ),
+    "adcirc": Own(
+        "adcirc", recognise.adcirc, dict.fromkeys((".14", ".grd", ".gr3"), "adcirc"), "ADCIRC, SCHISM",
+        "grids of triangles and quadrilaterals; depths stay with their nodes; nodes that a barrier pairs are held",
+        "open and land boundaries",
+    ),
     "elmer": Own(
         "elmer", recognise.by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
         "a folder with `mesh.header`, or one of its files; not what is partitioned",

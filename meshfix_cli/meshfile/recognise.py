@@ -262,5 +262,18 @@ def ugrid(data: bytes, text: str) -> Format | None:
     return Format("ugrid", True) if binary(data) else None
 
 
+# A title, two counts, and two lines of a number and three more; behind these another word may stand.
+_ADCIRC = re.compile(
+    r"(?:[^\n]*\n)?\s*(\d+)[ \t]+(\d+)(?:[ \t]+[^-+.\d\s][^\n]*)?[ \t]*\n"
+    rf"(?:\s*\d+(?:[ \t]+{_NUMBER}){{3}}(?:[ \t][^\n]*)?\n){{2}}"
+)
+
+
+def adcirc(_: bytes, text: str) -> Format | None:
+    """Recognise the counts and the first nodes."""
+    head = _ADCIRC.match(text.replace("\r\n", "\n").replace("\r", "\n"))
+    return Format("adcirc") if head and int(head[2]) >= 3 and 1 <= int(head[1]) <= 2 * int(head[2]) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

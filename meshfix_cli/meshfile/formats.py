@@ -206,6 +206,11 @@ OWN = {
         "grids of triangles and quadrilaterals; depths stay with their nodes; nodes that a barrier pairs are held",
         "open and land boundaries",
     ),
+    "febio": Own(
+        "febio", recognise.febio, {".feb": "febio"}, "FEBio",
+        "versions 1 to 4, with the mesh in the file; no instances of parts",
+        "materials; parts, surfaces, and sets of nodes and elements",
+    ),
     "elmer": Own(
         "elmer", recognise.by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
         "a folder with `mesh.header`, or one of its files; not what is partitioned",

@@ -275,5 +275,10 @@ def adcirc(_: bytes, text: str) -> Format | None:
     return Format("adcirc") if head and int(head[2]) >= 3 and 1 <= int(head[1]) <= 2 * int(head[2]) else None
 
 
+def febio(_: bytes, text: str) -> Format | None:
+    """Recognise the root."""
+    return Format("febio") if text.startswith("<") and re.search(r"<febio_spec\b", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -1,7 +1,6 @@
 """Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
 
-Source: FreeFEM documentation, "Mesh generation"; GetFEM user documentation, "Build a
-mesh".
+Source: GetFEM user documentation, "Build a mesh".
 """
 
 from __future__ import annotations
@@ -15,12 +14,8 @@ from meshfix_cli.meshfile.formats import HEAD
 from meshfix_cli.meshfile.recognise import Format
 
 MOST_BYTES = 65536  # of a data set that may be texts
-_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][-+]?\d+)?"
 # How a file begins, and where its extension must help to tell.
-_FOREIGN = (
-    ("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),
-    ("FreeFEM", rf"\d+ +\d+ +\d+\s*\n\s*(?:{_NUMBER}\s+){{2,3}}\d+\s*\n", ".msh"),
-)
+_FOREIGN = (("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),)
 
 
 def name_of(data: bytes, suffix: str) -> str | None:
@@ -51,7 +46,6 @@ def _several(data: bytes, form: Format) -> str | None:
 
 # What stands once in a file of one mesh: of several, meshio reads one, or lays them over one another.
 _ONCE = {
-    "netgen": ("meshes", rb"(?m)^\s*points\s*$"),
     "permas": ("blocks of nodes", rb"(?mi)^\s*\$COOR\b"),
 }
 

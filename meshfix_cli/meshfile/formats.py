@@ -121,6 +121,11 @@ OWN = {
         "cards in columns of 8, 10 and 20 and between commas; degenerate solids are what they are; no file that it "
         "includes", "parts; these by their titles, and sets of nodes, elements and parts",
     ),
+    "mapdl": Own(
+        "mapdl", recognise.mapdl, {".cdb": "mapdl"}, "Ansys Mechanical",
+        "archives and input files with blocks of nodes and elements, under other names too; elements that commands "
+        "make one by one stay", "materials and types; components",
+    ),
     "abaqus": Own(
         "abaqus", recognise.abaqus, {".inp": "abaqus"}, "Abaqus",
         "parts, instances, sets, sections; files that it includes; no mesh that comes from `*NGEN` and the like",
@@ -218,9 +223,33 @@ OWN = {
         "byu", recognise.byu, {".byu": "byu", ".g": "byu"}, "MOVIE.BYU",
         "in columns and without; polygons of five points or more are held", "parts",
     ),
+    "netgen": Own(
+        "netgen", recognise.netgen, {".vol": "netgen"}, "Netgen",
+        "all dialects of surface elements and edges; the geometry behind the mesh stays; no curved elements",
+        "domains and boundaries; these by their names",
+    ),
     "fluent": Own(
         "fluent", recognise.fluent, {".cas": "fluent", ".msh": "fluent"}, "Ansys Fluent",
         "text and binary; other polyhedra and polygons are held", "zones of cells and of faces",
+    ),
+    "freefem": Own(
+        "freefem", recognise.freefem, {".msh": "freefem"}, "FreeFEM",
+        "triangles in the plane and in space, and tetrahedra", "labels; those of the boundary",
+    ),
+    "ugrid": Own(
+        "ugrid", recognise.ugrid, {".ugrid": "ugrid"}, "UGRID (AFLR)",
+        "text, and binary of either byte order and precision, as a stream and as records of Fortran",
+        "parts of the surface",
+    ),
+    "adcirc": Own(
+        "adcirc", recognise.adcirc, dict.fromkeys((".14", ".grd", ".gr3"), "adcirc"), "ADCIRC, SCHISM",
+        "grids of triangles and quadrilaterals; depths stay with their nodes; nodes that a barrier pairs are held",
+        "open and land boundaries",
+    ),
+    "febio": Own(
+        "febio", recognise.febio, {".feb": "febio"}, "FEBio",
+        "versions 1 to 4, with the mesh in the file; no instances of parts",
+        "materials; parts, surfaces, and sets of nodes and elements",
     ),
     "elmer": Own(
         "elmer", recognise.by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",

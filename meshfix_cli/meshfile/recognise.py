@@ -246,5 +246,75 @@ def byu(_: bytes, text: str) -> Format | None:
     return Format("byu") if inside and "." in "".join(words[4 + 2 * counts[0] :][:1]) else None
 
 
+_MAPDL = re.compile(
+    r"(?i)(?:!.*\n\s*)*(?:/(?:COM|PREP7|BATCH|NOPR|TITLE|CLEAR|UNITS|CONFIG|GO)\b|FINI(?:SH)?\s|ET\s*,\s*\d)"
+)
+
+
+def mapdl(_: bytes, text: str) -> Format | None:
+    """Recognise the first command behind comments, or a block of nodes."""
+    lines = text.replace("\r", "\n")
+    block = re.search(r"(?im)^[ \t]*NBLOCK[ \t]*,[ \t]*\d", lines)
+    return Format("mapdl") if block or _MAPDL.match(lines) else None
+
+
+def netgen(_: bytes, text: str) -> Format | None:
+    """Recognise the first keyword behind comments."""
+    return Format("netgen") if re.match(r"(?:#[^\r\n]*\s*)*mesh3d[ \t]*[\r\n]", text) else None
+
+
+# Three counts, and two vertices of two or three coordinates and a label.
+_FREEFEM = re.compile(
+    rf"(\d+)[ \t]+(\d+)[ \t]+(\d+)[ \t]*[\r\n]\s*"
+    rf"((?:{_NUMBER}[ \t]+){{2,3}}-?\d+[ \t]*[\r\n]\s*(?:{_NUMBER}[ \t]+){{2,3}}-?\d+[ \t]*[\r\n])"
+)
+
+
+def freefem(data: bytes, text: str) -> Format | None:
+    """Recognise the counts and the first vertices; where all of these are integers, also by the number of lines."""
+    head = _FREEFEM.match(text)
+    if head is None or int(head[1]) < 3:
+        return None
+    if "." in head[4]:
+        return Format("freefem")
+    numbered = [line.split()[0] for line in head[4].split("\n" if "\n" in head[4] else "\r")[:2]]
+    width = len(head[4].split()) // 2
+    elements = numbered in (["0", "1"], ["1", "2"]) and width == 1 + int(head[2]) + int(head[3])  # Triangle's
+    breaks = max(data.count(b"\n"), data.count(b"\r"))
+    return None if elements or breaks < sum(int(head[i]) for i in (1, 2, 3)) else Format("freefem")
+
+
+_UGRID = re.compile(rf"(?:\d+[ \t]+){{6}}\d+[ \t]*[\r\n]\s*(?:{_NUMBER}[ \t]+){{2}}{_NUMBER}[ \t]*[\r\n]")
+
+
+def ugrid(data: bytes, text: str) -> Format | None:
+    """Recognise seven counts and the first node, or a length that fits such counts."""
+    if _UGRID.match(text):
+        return Format("ugrid", False)
+    if b"\0" not in data[:64]:
+        return None
+    from meshfix_cli.meshfile.ugrid_layout import binary
+
+    return Format("ugrid", True) if binary(data) else None
+
+
+# A title, two counts, and two lines of a number and three more; behind these another word may stand.
+_ADCIRC = re.compile(
+    r"(?:[^\n]*\n)?\s*(\d+)[ \t]+(\d+)(?:[ \t]+[^-+.\d\s][^\n]*)?[ \t]*\n"
+    rf"(?:\s*\d+(?:[ \t]+{_NUMBER}){{3}}(?:[ \t][^\n]*)?\n){{2}}"
+)
+
+
+def adcirc(_: bytes, text: str) -> Format | None:
+    """Recognise the counts and the first nodes."""
+    head = _ADCIRC.match(text.replace("\r\n", "\n").replace("\r", "\n"))
+    return Format("adcirc") if head and int(head[2]) >= 3 and 1 <= int(head[1]) <= 2 * int(head[2]) else None
+
+
+def febio(_: bytes, text: str) -> Format | None:
+    """Recognise the root."""
+    return Format("febio") if text.startswith("<") and re.search(r"<febio_spec\b", text) else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

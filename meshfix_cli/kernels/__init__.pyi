@@ -181,6 +181,9 @@ class Reference:
         The distances (q,) are those from the pieces as they are; searches begin at pieces `near` (q,) if there are any.
         """
 
+    def farthest(self, points: Float64, shapes: Int32, threads: int, near: Int32) -> float:
+        """The largest of the distances that `nearest` gives, of no points 0."""
+
 def joined(pairs: Int32, n: int) -> Int32:
     """Number things (n,) so that those which pairs (p, 2) join have one number: the smallest of them."""
 

@@ -81,9 +81,13 @@ class Shapes:
     folds: int
     walks: bool = False
 
-    def kernel(self, corners: Array | None = None) -> kernels.Reference:
-        """Return the same for the kernels, maybe with other corners; it is not kept: processes send their parts."""
-        corners = self.corners if corners is None else corners
+    @cached_property
+    def kernel(self) -> kernels.Reference:
+        """The same for the kernels; parts that are sent to other processes are made anew."""
+        return self._kernel_at(self.corners)
+
+    def _kernel_at(self, corners: Array) -> kernels.Reference:
+        """Return it with its corners elsewhere."""
         made = kernels.Reference(corners, self.ways, self.first, self.directions)
         if self.walks:
             made.let_walk(self.vertices)
@@ -97,27 +101,28 @@ class Shapes:
         same = self.vertices, self.corners, self.ways, self.first, self.directions
         return Shapes(*same, offsets, around, self.bound, self.folds, self.walks)
 
-    def distances(self, points: Array, threads: int = 1) -> tuple[float, Array]:
+    def distances(self, points: Array, threads: int = 1) -> tuple[float, float]:
         """Return how far the shapes with their corners at points (k, d) are from the reference, at most, both ways.
 
-        That is found at vertices, and at the middles of edges and triangles. With it `deviations`.
+        That is found at vertices, and at the middles of edges and triangles. With it the largest of `deviations`.
         """
-        moved = points[self.vertices]
-        reference, other = self.kernel(), self.kernel(np.ascontiguousarray(moved))
-        deviations = self._far(reference, self._middles(moved), threads)
-        back = self._far(other, [*self._middles(self.corners), *np.swapaxes(self.corners, 0, 1)], threads)
-        vertices = self._far(reference, list(np.swapaxes(moved, 0, 1)), threads)
-        return float(max(far.max(initial=0) for far in (deviations, back, vertices))), deviations
+        moved = np.ascontiguousarray(points[self.vertices])
+        deviation = self._farthest(self.kernel, self._middles(moved), threads)
+        back = [*self._middles(self.corners), *np.swapaxes(self.corners, 0, 1)]
+        others = self._farthest(self._kernel_at(moved), back, threads)
+        return max(deviation, others, self._farthest(self.kernel, [*np.swapaxes(moved, 0, 1)], threads)), deviation
 
     def deviations(self, points: Array, threads: int = 1) -> Array:
         """Tell how far (p,) the middles of each piece are from the reference, at most; its corners at points (k, d)."""
-        return self._far(self.kernel(), self._middles(points[self.vertices]), threads)
+        pieces = np.arange(len(self.shape), dtype=np.int32)
+        near = (np.ascontiguousarray(some) for some in self._middles(points[self.vertices]))
+        return np.asarray(np.max([self.kernel.nearest(some, self.shape, threads, pieces)[1] for some in near], axis=0))
 
-    def _far(self, reference: kernels.Reference, places: list[Array], threads: int) -> Array:
-        """Return how far (p,) some places, each (p, d) of the pieces, are from a reference at most."""
+    def _farthest(self, reference: kernels.Reference, places: list[Array], threads: int) -> float:
+        """Return how far places, each (p, d) of the pieces, are from a reference at most."""
         pieces = np.arange(len(self.shape), dtype=np.int32)
         near = (np.ascontiguousarray(some) for some in places)
-        return np.asarray(np.max([reference.nearest(some, self.shape, threads, pieces)[1] for some in near], axis=0))
+        return max(reference.farthest(some, self.shape, threads, pieces) for some in near)
 
     @cached_property
     def shape(self) -> Numbers:

@@ -56,7 +56,7 @@ class Freedom:
         flat = self.frame, self.directions, self.axes, self.offsets, self.neighbours
         if self.shapes is None:
             return kernels.Freedom(*flat)
-        made = kernels.Freedom(*flat, self.shapes.kernel())
+        made = kernels.Freedom(*flat, self.shapes.kernel)
         made.keep_near(self.shapes.offsets, self.shapes.around, self.shapes.bound)
         return made
 
@@ -127,7 +127,7 @@ class Freedom:
         result, distances = points.copy(), np.zeros(len(points))
         if self.shapes is not None:
             rows, shape = np.flatnonzero(self.curved), self.frame[self.curved] - np.int32(len(self.axes))
-            result[rows], far = self.shapes.kernel().nearest(points[rows], shape, threads)
+            result[rows], far = self.shapes.kernel.nearest(points[rows], shape, threads)
             distances[rows] = np.minimum(far, np.linalg.norm(result[rows] - points[rows], axis=1))
         return result, distances
 

@@ -368,12 +368,13 @@ def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, fl
 
         facets, encloses = facets_of(after.topology), is_closed(after.topology)
     (size, boundary), (new_size, new_boundary) = (_sizes(one - points[0], facets) for one in (points, there))
-    hausdorff, deviations = shapes.distances(there, threads)
+    hausdorff, deviation = shapes.distances(there, threads)
+    most = shapes.bound * WITHIN
     return {
         "hausdorff": hausdorff,
-        "deviation": float(deviations.max(initial=0)),
+        "deviation": deviation,
         "bound": shapes.bound,
-        "beyond": int((deviations > shapes.bound * WITHIN).sum()),
+        "beyond": int((shapes.deviations(there, threads) > most).sum()) if deviation > most else 0,
         "folds": shapes.folds,
         **({"size": _change(size, new_size)} if encloses else {}),
         "boundary": _change(boundary, new_boundary),

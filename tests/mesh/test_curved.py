@@ -65,6 +65,10 @@ def test_the_nearest_piece_is_that_of_a_search_among_all(d: int, directions: int
         seen = np.linalg.norm(places[:, None] - dense, axis=2).min(axis=1)
         assert (far <= seen + 1e-15).all()
         assert (seen - far <= 0.6 / steps).all()
+        near = np.full(40, begin, dtype=np.int32)
+        numbers = np.full(40, shape, dtype=np.int32)
+        assert all(reference.farthest(places, numbers, threads, near) == far.max() for threads in (1, 2))
+        assert reference.farthest(places[:0], numbers[:0], 1, near[:0]) == 0.0
 
 
 def sphere_error(mesh: Mesh) -> tuple[float, float]:
@@ -73,7 +77,7 @@ def sphere_error(mesh: Mesh) -> tuple[float, float]:
     middles = shapes.corners.mean(axis=1)
     outer = np.linalg.norm(shapes.corners[:, 0], axis=1) > 0.75
     number = np.repeat(np.arange(len(shapes.directions), dtype=np.int32), np.diff(shapes.first))
-    there, far = shapes.kernel().nearest(middles, number, 1)
+    there, far = shapes.kernel.nearest(middles, number, 1)
     assert far.max() < 1e-15
     flat, rounded = (np.abs(np.linalg.norm(one[outer], axis=1) - 1).max() for one in (middles, there))
     return float(flat), float(rounded)
@@ -90,7 +94,7 @@ def test_rounded_polygons_are_near_their_circle(count: int) -> None:
     shapes = shapes_of(Mesh.build(*rings(1.0, 2.0, count)))
     middles = shapes.corners.mean(axis=1)
     number = np.repeat(np.arange(len(shapes.directions), dtype=np.int32), np.diff(shapes.first))
-    there, _ = shapes.kernel().nearest(middles, number, 1)
+    there, _ = shapes.kernel.nearest(middles, number, 1)
     radius = np.round(np.linalg.norm(shapes.corners[:, 0], axis=1))
     flat, rounded = (np.abs(np.linalg.norm(one, axis=1) - radius).max() for one in (middles, there))
     # The sagitta is of the second order, what is left of it of the fourth.
@@ -103,7 +107,7 @@ def test_corners_stay_as_they_are() -> None:
     number = np.repeat(np.arange(len(shapes.directions), dtype=np.int32), np.diff(shapes.first))
     for k in range(2):
         corners = np.ascontiguousarray(shapes.corners[:, k])
-        there, far = shapes.kernel().nearest(corners, number, 1)
+        there, far = shapes.kernel.nearest(corners, number, 1)
         assert np.array_equal(there, corners)
         assert not far.any()
 

@@ -44,7 +44,7 @@ def deviation(mesh: Mesh) -> float:
     a, b, shape, _ = shapes.around.T
     middles = (points[here] + points[a]) / 2
     centres = np.where(b[:, None] < 0, middles, (points[here] + points[a] + points[b]) / 3)
-    kernel, shape = shapes.kernel(), np.ascontiguousarray(shape)
+    kernel, shape = shapes.kernel, np.ascontiguousarray(shape)
     return max(float(kernel.nearest(one, shape, 1)[1].max()) for one in (middles, centres))
 
 

@@ -1,4 +1,5 @@
 // Bindings of what a mesh is: its order, facets, stars and crossings.
+#include <atomic>
 #include <memory>
 
 #include "mesh/crossings.hpp"
@@ -363,6 +364,28 @@ auto nearest_near_py(const Reference& self, const Matrix<const double>& points, 
     return nearest_py(self, points, shapes, threads, near.data());
 }
 
+// The largest distance of points (q, D) from their shapes (q,), by pieces near them (q,).
+double farthest_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
+                   int threads, const Vector<const std::int32_t>& near) {
+    const std::size_t count = points.shape(0);
+    if (static_cast<int>(points.shape(1)) != self.dimension() || shapes.shape(0) != count || near.shape(0) != count)
+        throw nb::value_error("the points are of another reference");
+    std::atomic<double> most2{0.0};
+    with_dimension(self.dimension(), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(static_cast<std::int64_t>(count), 1024, threads,
+                       [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+                           for (std::int64_t i = begin; i < end; ++i) {
+                               double least2 = most2.load();
+                               const double here2 = self.distance2_beyond<D>(least2, shapes.data()[i], load<D>(points.data() + i * D), near.data()[i]);
+                               while (here2 > least2 && !most2.compare_exchange_weak(least2, here2)) {}
+                           }
+                       });
+        return 0;
+    });
+    return std::sqrt(most2.load());
+}
+
 // Numbers things (n,) so that those which pairs (p, 2) join have one number, by the first of each.
 auto joined_py(const Matrix<const std::int32_t>& pairs, std::int32_t n) {
     std::vector<std::int32_t> first(n);
@@ -393,6 +416,7 @@ void bind_mesh(nb::module_& m) {
         .def("nearest", [](const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
                            int threads) { return nearest_py(self, points, shapes, threads, nullptr); },
              "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a)
+        .def("farthest", &farthest_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert())
         .def("nearest", &nearest_near_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert());
     m.def("joined", &joined_py, "pairs"_a.noconvert(), "n"_a);
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);

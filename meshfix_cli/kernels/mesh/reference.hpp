@@ -104,6 +104,15 @@ class Reference {
         return best.distance2 <= bound2;
     }
 
+    // The squared distance from the shape, if it is more than `least2`, else anything that is not.
+    template <int D>
+    double distance2_beyond(double least2, std::int32_t shape, const Vec<D>& p, std::int64_t near) const {
+        Foot<D> best = any_foot<D>(shape);
+        walk<D>(shape, static_cast<std::int32_t>(near), p, best, least2);
+        search<D>(shape, p, best, least2);
+        return best.distance2;
+    }
+
     // The foot, drawn half of the way to its projections to the planes (lines) at the corners of its piece, by its weights:
     // exact for quadratic surfaces to leading order. Source: T. Boubekeur and M. Alexa, "Phong tessellation", ACM
     // Transactions on Graphics 27 (2008), with 1/2 for their 3/4.

@@ -1,7 +1,4 @@
-"""Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads.
-
-Source: GetFEM user documentation, "Build a mesh".
-"""
+"""Formats that no module of this package reads: what they are called, and what meshio would miss in those it reads."""
 
 from __future__ import annotations
 
@@ -15,7 +12,12 @@ from meshfix_cli.meshfile.recognise import Format
 
 MOST_BYTES = 65536  # of a data set that may be texts
 # How a file begins, and where its extension must help to tell.
-_FOREIGN = (("GetFEM", r"(?:%[^\n]*\n\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST|BEGIN MESH STRUCTURE)", ""),)
+_FOREIGN = (
+    ("STEP", r"ISO-10303-21;", ""),
+    ("OpenCASCADE", r"(?:DBRep_DrawableShape|CASCADE Topology V)", ""),
+    ("EnSight", r"(?:#[^\n]*\n\s*)*FORMAT\s*\n\s*type:\s*ensight", ""),
+    ("glTF", r"glTF", ""),
+)
 
 
 def name_of(data: bytes, suffix: str) -> str | None:

@@ -251,6 +251,10 @@ OWN = {
         "versions 1 to 4, with the mesh in the file; no instances of parts",
         "materials; parts, surfaces, and sets of nodes and elements",
     ),
+    "getfem": Own(
+        "getfem", recognise.getfem, {".mesh": "getfem"}, "GetFEM",
+        "convexes of any order on a lattice; others are held", "regions, of faces where these are of simplices",
+    ),
     "elmer": Own(
         "elmer", recognise.by_extension, dict.fromkeys((".header", ".nodes", ".elements"), "elmer"), "Elmer",
         "a folder with `mesh.header`, or one of its files; not what is partitioned",

@@ -316,5 +316,11 @@ def febio(_: bytes, text: str) -> Format | None:
     return Format("febio") if text.startswith("<") and re.search(r"<febio_spec\b", text) else None
 
 
+def getfem(_: bytes, text: str) -> Format | None:
+    """Recognise a comment, or the list of points."""
+    begin = r"(?:%[^\r\n]*\s*)*(?:% GETFEM MESH|BEGIN POINTS LIST)"
+    return Format("getfem") if re.match(begin, text) or text.startswith("% GETFEM") else None
+
+
 def _is_xml(text: str) -> bool:
     return text.startswith(("<?xml", "<VTKFile", "<Xdmf", "<!DOCTYPE", "<dolfin"))

@@ -18,7 +18,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.document import Document
 
 FOREIGN = {
-    "c.mesh": ("% GETFEM MESH FILE \n% GETFEM VERSION 5.0\n\nBEGIN POINTS LIST\n", "GetFEM"),
+    "part.stp": ("ISO-10303-21;\nHEADER;\n", "STEP"),
+    "mesh.msh": ("CASCADE Topology V1, (c) Matra-Datavision\n", "OpenCASCADE"),
+    "result.case": ("# made here\nFORMAT\ntype:  ensight gold\n", "EnSight"),
 }
 
 

@@ -123,8 +123,8 @@ OWN = {
     ),
     "mapdl": Own(
         "mapdl", recognise.mapdl, {".cdb": "mapdl"}, "Ansys Mechanical",
-        "archives and input files with blocks of nodes and elements, under other names too; elements that commands "
-        "make one by one stay", "materials and types; components",
+        "archives and input files with blocks of nodes and elements, under other names too; elements that have a "
+        "command each stay", "materials and types; components",
     ),
     "abaqus": Own(
         "abaqus", recognise.abaqus, {".inp": "abaqus"}, "Abaqus",

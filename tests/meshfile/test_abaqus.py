@@ -295,6 +295,7 @@ def test_a_mark_of_byte_order_and_blanks_before_stars() -> None:
         ("C3D20R", ("hexahedron20", 20)),
         ("C3D15", ("wedge15", 15)),
         ("C3D5", ("pyramid", 5)),
+        ("F3D8", ("hexahedron", 8)),
         ("SC8R", ("hexahedron", 8)),
         ("SC6R", ("wedge", 6)),
         ("STRI3", ("triangle", 3)),

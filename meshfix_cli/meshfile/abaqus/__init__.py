@@ -29,7 +29,7 @@ _FACE = re.compile(
 )
 
 # Families of elements, behind which the number of nodes tells the shape; all others only hold their nodes.
-_SOLID = re.compile(r"(?:[A-Z]{0,3}C3D|Q3D|SC)(4|5|6|8|10|15|20)(?![\dV])")
+_SOLID = re.compile(r"(?:[A-Z]{0,3}C3D|F3D|Q3D|SC)(4|5|6|8|10|15|20)(?![\dV])")
 _PLANE = re.compile(r"(?:CPS|CPEG?|(?:DC?|A|CG)?CAX|CGAX|[A-Z]{0,2}C2D|WARP2D|M3D|R3D|SFM3D|D?S|STRI)(3|4|6|8|9)(?!\d)")
 _SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 # Solids that may lack some of their nodes: they are held, and named as what they are.

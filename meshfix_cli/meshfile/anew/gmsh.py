@@ -17,7 +17,7 @@ from meshfix_cli.errors import WriteError
 from meshfix_cli.mesh.elements import dimension_of
 from meshfix_cli.meshfile.anew.content import Content, Int64
 from meshfix_cli.meshfile.anew.gmsh_groups import Groups, groups_of
-from meshfix_cli.meshfile.anew.tables import integers, lines
+from meshfix_cli.meshfile.anew.tables import integers, numbered, reals
 from meshfix_cli.meshfile.gmsh import ENTITY, SETS
 from meshfix_cli.meshfile.gmsh.cells import TYPES, order_of
 from meshfix_cli.meshfile.recognise import Format
@@ -38,16 +38,16 @@ class _Out(NamedTuple):
             return struct.pack(f"<{kinds}", *values)
         return (" ".join(map(repr, values)) + "\n").encode()
 
-    def rows(self, kind: str, whole: Int64, reals: NDArray[np.float64] | None = None) -> bytes:
-        """Return rows of integers (n, k) of a type, and of reals (n, l) behind them."""
+    def rows(self, kind: str, whole: Int64, places: NDArray[np.float64] | None = None) -> bytes:
+        """Return rows of integers (n, k) of a type, and of reals (n, l) behind one or none of them."""
         if not self.binary:
-            if reals is None:
+            if places is None:
                 return integers(whole)
-            return lines(" ".join(["%d"] * whole.shape[1] + ["%r"] * reals.shape[1]) + "\n", whole, reals)
-        if reals is None:
+            return numbered(whole[:, 0], places) if whole.size else reals(places)
+        if places is None:
             return whole.astype(f"<{kind}").tobytes()
-        table = np.empty(len(whole), dtype=[("whole", f"<{kind}", whole.shape[1:]), ("reals", "<f8", reals.shape[1:])])
-        table["whole"], table["reals"] = whole, reals
+        table = np.empty(len(whole), dtype=[("whole", f"<{kind}", whole.shape[1:]), ("reals", "<f8", places.shape[1:])])
+        table["whole"], table["reals"] = whole, places
         return table.tobytes()
 
     def cut(self, rows: bytes, count: int, begin: Sequence[int]) -> list[bytes | memoryview]:

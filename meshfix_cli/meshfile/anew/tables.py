@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli import kernels
+
 
 def lines(form: str, *columns: NDArray[Any]) -> bytes:
     """Return a line for each row of some arrays (n,) or (n, k), next to one another.
@@ -55,6 +57,22 @@ def _digits(table: NDArray[np.uint32], digits: list[int], ends: list[bytes]) -> 
         text[at : at + len(end)] = np.frombuffer(end, dtype=np.uint8)[:, None]
         at += len(end)
     return text.T.tobytes().translate(None, b"\0")
+
+
+def reals(values: NDArray[np.float64], between: str = " ", longest: int = 0) -> bytes:
+    """Return a line for each row (n, k): the shortest texts that read back, of no more characters than may be."""
+    if not values.size:
+        return b"\n" * len(values)
+    text, spans = kernels.shortest(np.ascontiguousarray(values, dtype=np.float64).ravel(), False, longest)
+    ends = np.full(values.shape, ord(between), dtype=np.uint8)
+    ends[:, -1] = ord("\n")
+    return np.insert(np.frombuffer(text, dtype=np.uint8), spans[:, 1], ends.ravel()).tobytes()
+
+
+def numbered(numbers: NDArray[Any], values: NDArray[np.float64], between: str = " ", longest: int = 0) -> bytes:
+    """Return the same with the number (n,) of each row in front."""
+    rows = zip(integers(numbers).split(b"\n"), reals(values, between, longest).splitlines(keepends=True), strict=False)
+    return b"".join([number + between.encode() + row for number, row in rows])
 
 
 def form_of(reals: int, integers: int) -> str:

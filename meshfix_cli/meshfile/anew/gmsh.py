@@ -64,7 +64,11 @@ def written(content: Content, form: Format) -> bytes:
     """Return a file of version 2.2, in which an element is in one group, or of 4.1, in which it may be in several."""
     out, old = _Out(bool(form.binary)), form.name == "gmsh22"
     groups = groups_of(content, several=not old)
-    kept = [i for i, run in enumerate(content.cells) if run.type in _KINDS and len(run.vertices)]
+    kept = [
+        i
+        for i, run in enumerate(content.cells)
+        if run.type in _KINDS and len(run.vertices) and run.vertices.min() >= 0  # none lacks a node
+    ]
     about = f"{'2.2' if old else '4.1'} {int(out.binary)} 8\n".encode()
     parts = [_section("MeshFormat", about, *[struct.pack("<i", 1), b"\n"] * out.binary)]
     if groups.titles:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -37,13 +38,39 @@ def integers(*columns: NDArray[Any], between: str = " ", longest: int = 0) -> by
     if not len(table) or table.min() < 0 or table.max() >= 2**32:
         return lines("".join(f"%d{end}" for end in ends), table)
     digits = [len(str(most)) for most in table.max(axis=0).tolist()]
-    step = 1 << 14  # rows, which the cache holds
-    parts = (table[i : i + step].astype(np.uint32) for i in range(0, len(table), step))
-    return b"".join(_digits(part, digits, [end.encode() for end in ends]) for part in parts)
+    parts = (_digits(part, digits, [end.encode() for end in ends], b"\0") for part in _parts(table))
+    return b"".join(part.tobytes().translate(None, b"\0") for part in parts)
 
 
-def _digits(table: NDArray[np.uint32], digits: list[int], ends: list[bytes]) -> bytes:
-    """Return the numbers without blanks in front, each with its end behind it."""
+def in_columns(head: str, table: NDArray[Any], width: int, on_line: int, continued: str) -> bytes:
+    """Return a line for each row of integers (n, k), right in columns of a width.
+
+    Parameters
+    ----------
+    head : str
+        What each begins with.
+    on_line : int
+        How many columns it has; what is left stands on others, each of which begins as `continued` does.
+    """
+    ends = ["\n" + continued if i % on_line == 0 else "" for i in range(1, table.shape[1])] + ["\n"]
+    parts = (_digits(part, [width] * table.shape[1], [end.encode() for end in ends], b" ") for part in _parts(table))
+    return b"".join(beside(np.frombuffer(head.encode(), dtype=np.uint8), part) for part in parts)
+
+
+def beside(*columns: NDArray[np.uint8]) -> bytes:
+    """Return characters (n, k) next to one another, those (k,) of one row in all rows."""
+    n = max(len(array) for array in columns if array.ndim == 2)
+    return np.hstack([np.broadcast_to(array, (n, array.shape[-1])) for array in columns]).tobytes()
+
+
+def _parts(table: NDArray[Any]) -> Iterator[NDArray[np.uint32]]:
+    """Give some rows after others, which the cache holds."""
+    step = 1 << 14
+    return (table[i : i + step].astype(np.uint32) for i in range(0, len(table), step))
+
+
+def _digits(table: NDArray[np.uint32], digits: list[int], ends: list[bytes], blank: bytes) -> NDArray[np.uint8]:
+    """Return the characters of numbers (n, k), each with blanks in front and its end behind it."""
     text = np.empty((sum(digits) + sum(map(len, ends)), len(table)), dtype=np.uint8)
     at = 0
     for left, count, end in zip(np.ascontiguousarray(table.T), digits, ends, strict=True):
@@ -51,12 +78,12 @@ def _digits(table: NDArray[np.uint32], digits: list[int], ends: list[bytes]) -> 
             tenth = left // np.uint32(10)
             text[place] = left - np.uint32(10) * tenth + ord("0")
             if place < at + count - 1:
-                text[place] *= left > 0
+                text[place][left == 0] = ord(blank)
             left = tenth
         at += count
         text[at : at + len(end)] = np.frombuffer(end, dtype=np.uint8)[:, None]
         at += len(end)
-    return text.T.tobytes().translate(None, b"\0")
+    return text.T
 
 
 def reals(values: NDArray[np.float64], between: str = " ", longest: int = 0) -> bytes:

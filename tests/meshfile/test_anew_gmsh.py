@@ -104,6 +104,29 @@ def test_groups_that_overlap_survive_from_gmsh_to_gmsh(tmp_path: Path) -> None:
     assert in_gmsh(tmp_path / "out.msh")["groups"] == members(first)
 
 
+@pytest.mark.parametrize("form", NEW)
+def test_a_group_of_all_is_not_one_of_its_parts(form: Format, tmp_path: Path) -> None:
+    """Where it is the first group of some, and others have groups before it."""
+    source = named()
+    left = source.arrays.cell["material"][0] == 1
+    some, others, none = np.flatnonzero(left), np.flatnonzero(~left), np.empty(0, dtype=np.int64)
+    arrays = Arrays(
+        cell={"gmsh:physical": [np.where(left, 1, 2), np.full(40, -7)]},
+        groups={"steel": np.array([1, 3]), "all": np.array([2, 3]), "copper": np.array([3, 3])},
+        cell_sets={
+            "steel": [some, none], "all": [np.arange(len(left)), none], "copper": [others, none],
+            "wall": [none, np.arange(40)],
+        },
+        point_sets={"steel": np.arange(3)},
+    )  # fmt: skip
+    source = replace(source, load=lambda: arrays, regions=("gmsh:physical",))
+    back, _ = written_as(source, form, tmp_path / "out.msh")
+    expected = {name: [row for row in rows if len(row) > 1] for name, rows in members(source).items()}
+    assert members(back) == in_gmsh(tmp_path / "out.msh")["groups"] == expected
+    physical = [np.unique(values).tolist() for values in back.arrays.cell["gmsh:physical"]]
+    assert sorted({number for mine in physical for number in mine}) == [1, 2, 7]
+
+
 def test_sets_that_share_no_element_are_groups_of_old_files(tmp_path: Path) -> None:
     """Of those that do the small ones: a set of all would leave none of the others."""
     source, nothing = named(), np.empty(0, dtype=np.int64)

@@ -56,6 +56,8 @@ class Content:
         arrays = source.arrays
         region = next((name for name in (PHYSICAL, *source.regions) if name in arrays.cell), None)
         labels = None if region is None else _whole([np.asarray(values) for values in arrays.cell[region]])
+        if labels is not None and region == PHYSICAL:
+            labels = [np.abs(values) for values in labels]  # the sign is an orientation
         named = {
             name: (int(about[1]), int(about[0]))
             for name, about in arrays.groups.items()
@@ -65,11 +67,11 @@ class Content:
         sets: dict[str, list[Int64]] = {}
         point_sets: dict[str, Int64] = {}
         for name, group in groups_of(source).items():
+            if len(group.nodes):
+                point_sets[name] = group.nodes
             if name in titles.values() and _is_told(group, source.cells, labels or (), *named[name]):
                 continue
             titles = {key: title for key, title in titles.items() if title != name}
-            if len(group.nodes):
-                point_sets[name] = group.nodes
             if group.cells:
                 mine = {id(run): rows for run, rows in group.cells}
                 sets[name] = [mine.get(id(run), np.empty(0, dtype=np.int64)) for run in source.cells]

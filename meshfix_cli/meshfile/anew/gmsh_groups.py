@@ -61,7 +61,10 @@ def groups_of(content: Content, several: bool) -> Groups:
     """
     labels, numbers = _labels(content)
     titles = [(dimension, numbers.get(label, label), name) for (dimension, label), name in content.titles.items()]
-    sets = _numbers_of_sets(content, {*numbers.values(), *(number for _, number, _ in titles)})
+    taken = {(dimension, number) for dimension, number, _ in titles}
+    for run, values in zip(content.cells, labels, strict=True):
+        taken |= {(dimension_of(run.type), number) for number in _numbered(values)[0].tolist()}
+    sets = _numbers_of_sets(content, taken)
     codes, pieces = _pieces(content, labels, sets)
     dimensions = [dimension_of(run.type) for run in content.cells]
     if several:
@@ -83,26 +86,27 @@ def _labels(content: Content) -> tuple[Sequence[Int64], dict[int, int]]:
     """Return the number of the material of each cell, and those of all materials: they stay where gmsh has such."""
     if content.regions is None:
         return [np.zeros(len(run.vertices), dtype=np.int64) for run in content.cells], {}
-    used = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *content.regions]))
+    labels = content.regions
+    used = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *(_numbered(values)[0] for values in labels)]))
     if len(used) and (used[0] < 0 or used[-1] > _LARGEST):
         new = np.arange(len(used)) + (used[0] != 0)
-        return [new[np.searchsorted(used, values)] for values in content.regions], dict(
-            zip(used.tolist(), new.tolist(), strict=True)
-        )
-    return content.regions, {number: number for number in used.tolist()}
+        numbers = dict(zip(used.tolist(), new.tolist(), strict=True))
+        return [new[np.searchsorted(used, values)] for values in labels], numbers
+    return labels, {number: number for number in used.tolist()}
 
 
-def _numbers_of_sets(content: Content, taken: set[int]) -> dict[tuple[str, int], int]:
+def _numbers_of_sets(content: Content, taken: set[tuple[int, int]]) -> dict[tuple[str, int], int]:
     """Number the sets, by their names and the dimensions of their cells: as the input does, or behind all others."""
     numbers: dict[tuple[str, int], int] = {}
     own = {name: np.asarray(about).ravel().tolist() for name, about in content.arrays.groups.items()}
+    free = max([0, *(number for _, number in taken), *(about[0] for about in own.values() if len(about) == 2)])
     for name, runs in content.sets.items():
         there = {dimension_of(run.type) for run, rows in zip(content.cells, runs, strict=True) if len(rows)}
         for dimension in sorted(there):
             number = own[name][0] if name in own and own[name][1:] == [dimension] else 0
-            if not 0 < number <= _LARGEST or (number, dimension) in ((n, d) for (_, d), n in numbers.items()):
-                number = max([0, *taken, *(about[0] for about in own.values() if len(about) == 2)]) + 1
-            taken.add(number)
+            if not 0 < number <= _LARGEST or (dimension, number) in taken:
+                number = free = free + 1
+            taken.add((dimension, number))
             numbers[name, dimension] = number
     return numbers
 

@@ -260,7 +260,11 @@ class Source:
         lost += [f"point data {name}" for name, values in mine.point.items() if not _is_among(values, found)]
         found = [np.concatenate(runs) for runs in theirs.cell.values()]
         for name, runs in mine.cell.items():
-            if not _is_among(np.concatenate(runs), found):
+            values, others = np.concatenate(runs), found
+            if name in self.regions and values.ndim == 1 and values.dtype.kind in "iuf":
+                some = values != 0  # 0 is no region, and another format may number what is in none
+                values, others = values[some], [one[some] for one in found if len(one) == len(some)]
+            if not _is_among(values, others):
                 lost.append(f"cell data {name}")
         held = {*theirs.groups, *theirs.point_sets, *theirs.cell_sets}
         lost += [f"group {name}" for name in (*mine.groups, *mine.point_sets, *mine.cell_sets) if name not in held]

@@ -26,7 +26,6 @@ from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
 from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
-from meshfix_cli.meshfile.gmsh import cells as gmsh
 from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import solved_runs
@@ -40,19 +39,9 @@ for _element in ELEMENTS.values():
 _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
 _OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
-_TAGS = ("gmsh:physical", "gmsh:geometrical")
-_MATERIALS = {"gmsh": "gmsh:physical", "medit": "medit:ref", "meshb": "medit:ref"}
-# Of the elements of one shape meshio names a rigid one, one with the pressure of pores, a hybrid one; some it invents.
-_PLAIN = {
-    "abaqus": {
-        b"R3D3": b"CPS3", b"CAX4P": b"CPS4", b"C3D8RH": b"C3D8", b"CPE6": b"CPS6", b"S8R5": b"CPS8",
-        b"C3D10MH": b"C3D10", b"C3D20RH": b"C3D20",
-    },
-    "nastran": {b"CTETRA_": b"CTETRA ", b"CPYRA_": b"CPYRA ", b"CPENTA_": b"CPENTA ", b"CHEXA_": b"CHEXA "},
-}  # fmt: skip
-_NAMES = {"abaqus": rb"(?<=TYPE=)\w+(?=\n)", "nastran": rb"(?m)^\w+"}
+_MATERIALS = {"meshb": "medit:ref"}
 _TURNED = ("vtk", "vtu")
-_WITH_SETS = ("abaqus", "exodus")
+_WITH_SETS = ("exodus",)
 # Which module's clock a writer asks for a remark: with that the same mesh would not have the same bytes.
 _CLOCKS = {
     "exodus": ("meshio.exodus._exodus", "datetime"),
@@ -62,7 +51,6 @@ _CLOCKS = {
 _NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
 _STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
 _ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
-_ORDERED = ("tetra10", "pyramid13", "wedge15", "hexahedron20", "hexahedron27")  # by meshio itself, for gmsh
 # What it calls elements of more than second order for VTK, in whose order they are.
 _LAGRANGE = {
     "line": "CURVE", "triangle": "TRIANGLE", "quad": "QUADRILATERAL", "tetra": "TETRAHEDRON", "wedge": "WEDGE",
@@ -106,9 +94,6 @@ def write(path: Path, source: Source, points: NDArray[np.floating[Any]], form: F
         raise WriteError(last)
     if len(list(path.parent.iterdir())) > 1:
         raise WriteError(f"cannot be written as {form.name}: it takes more than one file")
-    if form.name in _PLAIN:
-        plain = _PLAIN[form.name]
-        path.write_bytes(re.sub(_NAMES[form.name], lambda name: plain.get(name[0], name[0]), path.read_bytes()))
 
 
 def _write(path: Path, mesh: meshio.Mesh, form: Format) -> None:
@@ -168,20 +153,15 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
             text = material if text == region or region is None else f"{text} of the input"
         return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
 
-    def values(key: str, array: Any) -> Any:
-        if form.reader == "gmsh" and not form.binary and key not in _TAGS:
-            return np.asarray(array, dtype=np.float64).astype(object)  # meshio writes the repr, "np.float64(1.0)"
-        return array
-
     cell = {name(key, True): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
-    if form.reader in ("medit", "meshb"):  # any integers would be taken for references
+    if form.reader == "meshb":  # any integers would be taken for references
         cell = {key: runs for key, runs in cell.items() if key == material}
     sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(
         points,
         [(_name_in(form, source.cells[i].type), _in_order_of(form, source.cells[i])) for i in kept],
-        point_data={name(key): values("", array) for key, array in arrays.point.items()},
-        cell_data={key: [values(key, array) for array in runs] for key, runs in cell.items()},
+        point_data={name(key): array for key, array in arrays.point.items()},
+        cell_data=cell,
         # The numbers of sets of groups are not those of the groups.
         field_data={} if region == "gmsh:physical_set" else dict(arrays.groups),
         point_sets=dict(arrays.point_sets) if form.name in _WITH_SETS else {},
@@ -198,8 +178,6 @@ def _name_in(form: Format, key: str) -> str:
 def _in_order_of(form: Format, run: Cells) -> Any:
     """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, and no others."""
     order = _ORDERS.get(form.reader, {}).get(run.type)
-    if form.reader == "gmsh" and run.type not in _ORDERED:
-        order = gmsh.order_of(run.type)
     if form.reader == "vtu" and run.type not in ELEMENTS and run.type in kinds():
         order = kinds()[run.type].order_of("vtk 8")  # for meshio calls the file one of an old version
     if order is not None:

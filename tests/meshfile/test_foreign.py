@@ -122,7 +122,7 @@ def test_words_of_libraries_do_not_reach_the_user(tmp_path: Path) -> None:
     points, cells = plate()
     quads = [("triangle", cells), ("quad", np.array([[0, 1, 2, 3]]))]
     meshio.Mesh(points, quads).write(tmp_path / "in.vtk")
-    line = error_line("untangle", tmp_path / "in.vtk", tmp_path / "o.su2")
+    line = error_line("untangle", tmp_path / "in.vtk", tmp_path / "o.f3grid")
     assert line.endswith("(meshio's writer fails on quadrilaterals and triangles whose points have three coordinates)")
 
 

@@ -35,7 +35,7 @@ _SIZES = {
     "hexahedron": (8, 20),
 }  # fmt: skip
 # Where the table of elements has another order: which of the card's nodes stands there.
-_ORDER = {
+ORDER = {
     "hexahedron20": [*range(12), *range(16, 20), *range(12, 16)],
     "wedge15": [*range(9), 12, 13, 14, 9, 10, 11],
     "CTRIAX6": [0, 2, 4, 1, 3, 5],  # nodes stand along the circumference
@@ -76,7 +76,7 @@ def _add_shapes(deck: Deck, rows: Int64, more: bool, points: Numbering, runs: Ru
     name = deck.names[deck.kinds[rows[0]]]
     shape, most = _SHAPES[name]
     corners = _corners_of(name)
-    columns = np.array(_ORDER.get(name, range(most if more else corners))) + 2
+    columns = np.array(ORDER.get(name, range(most if more else corners))) + 2
     numbers = deck.integers(rows, 0, columns.max() + 1, texts=more)
     ids, properties, nodes = np.ascontiguousarray(numbers[:, 0]), numbers[:, 1], _taken(numbers[:, 2:], columns - 2)
     if numbers.min() <= 0:
@@ -89,7 +89,7 @@ def _add_shapes(deck: Deck, rows: Int64, more: bool, points: Numbering, runs: Ru
             continue
         here = slice(None) if chosen.all() else np.flatnonzero(chosen)
         key = f"{shape}_incomplete" if not size else shape if size == corners else f"{shape}{size}"
-        order = np.array(_ORDER.get(key, range(size or nodes.shape[1])))
+        order = np.array(ORDER.get(key, range(size or nodes.shape[1])))
         vertices = _vertices(_taken(nodes[here], order), ids[here], points)
         places = partial(_places, deck, rows[here], columns[order])
         runs.add(Cells(key, vertices, ids[here]), places, {REF: properties[here]})

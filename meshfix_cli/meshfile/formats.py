@@ -55,7 +55,7 @@ class Own:
 
 
 # By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
-# in which each element has its group: meshio's writer of 4.1 has one for each run of them.
+# which most programs read.
 _VTK_GROUPS = "cell data that are called like a material"
 _LZ4 = "`lz4`, where numbers are compressed so"
 OWN = {

@@ -260,7 +260,9 @@ class Source:
         lost += [f"point data {name}" for name, values in mine.point.items() if not _is_among(values, found)]
         found = [np.concatenate(runs) for runs in theirs.cell.values()]
         for name, runs in mine.cell.items():
-            if not _is_among(np.concatenate(runs), found):
+            values = np.concatenate(runs)
+            some = values != 0 if name in self.regions else slice(None)  # 0 is none, which others may have a number for
+            if not _is_among(values[some], [one[some] for one in found if len(one) == len(values)]):
                 lost.append(f"cell data {name}")
         held = {*theirs.groups, *theirs.point_sets, *theirs.cell_sets}
         lost += [f"group {name}" for name in (*mine.groups, *mine.point_sets, *mine.cell_sets) if name not in held]

@@ -254,8 +254,6 @@ def other_format(document: Document, target: str) -> str | None:
 
 
 def _writable(form: Format, target: str) -> Format:
-    if form.name == "gmsh":  # meshio leaves out entities that own no node, and gmsh does not open that
-        raise WriteError(f"{target}: files of gmsh 4.1 are written back, but not made of others; use --format gmsh22")
     name = compressed.inner(Path(target)).name
     if form.name == "ugrid" and not re.search(r"\.l?[br](?:4|8)l?\.ugrid$", name):  # meshio writes numpy's repr
         raise WriteError(f"{target}: text files of UGRID cannot be written; name a .b8.ugrid")

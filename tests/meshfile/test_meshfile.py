@@ -260,11 +260,6 @@ def test_an_unknown_extension_is_no_format(tmp_path: Path) -> None:
     assert output_format(wrong, str(tmp_path / "other.vtk")).reader == "vtk"
 
 
-def test_gmsh_4_is_not_made_of_other_files(tmp_path: Path) -> None:
-    with pytest.raises(WriteError, match="use --format gmsh22"):
-        output_format(read(SAMPLES / "two_materials.msh"), str(tmp_path / "o.msh"), "gmsh")
-
-
 def test_isolated_points_may_be_anything(tmp_path: Path) -> None:
     text = (SAMPLES / "plate_tangled.obj").read_text()
     (tmp_path / "in.obj").write_text(f"{text}v nan inf -inf\nv 1e308 1e308 1e308\n")

@@ -31,10 +31,10 @@ _FACE = re.compile(
 # Families of elements, behind which the number of nodes tells the shape; all others only hold their nodes.
 _SOLID = re.compile(r"(?:[A-Z]{0,3}C3D|Q3D|SC)(4|5|6|8|10|15|20)(?![\dV])")
 _PLANE = re.compile(r"(?:CPS|CPEG?|(?:DC?|A|CG)?CAX|CGAX|[A-Z]{0,2}C2D|WARP2D|M3D|R3D|SFM3D|D?S|STRI)(3|4|6|8|9)(?!\d)")
-_SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
+SOLIDS = {4: "tetra", 5: "pyramid", 6: "wedge", 8: "hexahedron", 10: "tetra10", 15: "wedge15", 20: "hexahedron20"}
 # Solids that may lack some of their nodes: they are held, and named as what they are.
 _LACKING = {"C3D15V": "wedge", "C3D27": "hexahedron"}
-_PLANES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+PLANES = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 
 
 def parse(data: bytes, path: Path | None = None) -> Source:
@@ -115,7 +115,7 @@ def _shape(name: str) -> tuple[str, int]:
     """Return what elements are for meshio, and the number of their nodes; 0: not known."""
     if name.startswith("STRI65"):
         return "triangle6", 6
-    for family, shapes in ((_SOLID, _SOLIDS), (_PLANE, _PLANES)):
+    for family, shapes in ((_SOLID, SOLIDS), (_PLANE, PLANES)):
         if match := family.match(name):
             return shapes[int(match[1])], int(match[1])
     return "", 0

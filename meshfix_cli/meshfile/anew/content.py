@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import dimension_of
-from meshfix_cli.meshfile.groups import groups_of
+from meshfix_cli.meshfile.groups import Group, groups_of
 from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Points
 
@@ -65,13 +65,18 @@ class Content:
         sets: dict[str, list[Int64]] = {}
         point_sets: dict[str, Int64] = {}
         for name, group in groups_of(source).items():
-            if name in named and labels is not None:
+            if name in titles.values() and _is_told(group, source.cells, labels or (), *named[name]):
                 continue
+            titles = {key: title for key, title in titles.items() if title != name}
             if len(group.nodes):
                 point_sets[name] = group.nodes
             if group.cells:
                 mine = {id(run): rows for run, rows in group.cells}
                 sets[name] = [mine.get(id(run), np.empty(0, dtype=np.int64)) for run in source.cells]
+        for name, key in _regions_of_sets(sets, source.cells, labels or ()).items():
+            if key not in titles:
+                titles[key] = name
+                del sets[name]
         return cls(points, source.cells, labels, titles, sets, point_sets, arrays, region)
 
     def title(self, dimension: int, number: int) -> str:
@@ -119,6 +124,32 @@ def words_of(names: Sequence[str], allowed: str = r"\w.+-", longest: int = 80, l
             word = first[: longest - len(end)] + end
         taken.add(word.lower() if lower else word)
         found[name] = word
+    return found
+
+
+def _is_told(group: Group, cells: Sequence[Cells], labels: Sequence[Int64], dimension: int, number: int) -> bool:
+    """Whether the cells of a group are those of its number, and no others: cells that are in several have one."""
+    mine = [values for run, values in zip(cells, labels, strict=True) if dimension_of(run.type) == dimension]
+    return sum(len(rows) for _, rows in group.cells) == sum(int((np.abs(values) == number).sum()) for values in mine)
+
+
+def _regions_of_sets(
+    sets: Mapping[str, Sequence[Int64]], cells: Sequence[Cells], labels: Sequence[Int64]
+) -> dict[str, tuple[int, int]]:
+    """Return the dimension and the number of the material of which a set has all cells, and no others."""
+    found: dict[str, tuple[int, int]] = {}
+    sizes: dict[tuple[int, int], int] = {}
+    for run, values in zip(cells, labels, strict=False):
+        for number, count in zip(*(one.tolist() for one in np.unique(values, return_counts=True)), strict=True):
+            key = dimension_of(run.type), number
+            sizes[key] = sizes.get(key, 0) + count
+    for name, runs in sets.items() if sizes else ():
+        keys = {
+            (dimension_of(cells[i].type), one) for i, rows in enumerate(runs) for one in set(labels[i][rows].tolist())
+        }
+        key = keys.pop() if len(keys) == 1 else (0, 0)
+        if key[1] and sizes[key] == sum(map(len, runs)):
+            found[name] = key
     return found
 
 

@@ -23,7 +23,7 @@ from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import Numbering
 
-_SETS, _ENTITY = "gmsh:physical_set", "gmsh:geometrical"
+SETS, ENTITY = "gmsh:physical_set", "gmsh:geometrical"
 
 
 def parse(data: bytes) -> Source | None:
@@ -137,13 +137,13 @@ def _labels(files: Sequence[File]) -> list[dict[str, list[Int64]]]:
         np.full(len(block.ids), (*groups, 0)[0]) if block.physical is None else block.physical
         for block, groups in zip(blocks, sets, strict=True)
     ]
-    labels = {_ENTITY: [block.entities for block in blocks]}
+    labels = {ENTITY: [block.entities for block in blocks]}
     if any(values.any() for values in physical):
         labels[PHYSICAL] = physical
     if any(len(groups) > 1 for groups in sets):
         known: dict[frozenset[int], int] = {frozenset(): 0}
         codes = [known.setdefault(frozenset(groups), len(known)) for groups in sets]
-        labels[_SETS] = [np.full(len(block.ids), code) for block, code in zip(blocks, codes, strict=True)]
+        labels[SETS] = [np.full(len(block.ids), code) for block, code in zip(blocks, codes, strict=True)]
     ends = np.cumsum([len(file.blocks) for file in files]).tolist()
     return [
         {name: values[end - len(file.blocks) : end] for name, values in labels.items()}
@@ -157,7 +157,7 @@ def _ids(cells: Sequence[Cells]) -> Int64:
 
 def _regions(file: File, cells: Sequence[Cells], labels: Mapping[str, Sequence[Int64]]) -> tuple[str, ...]:
     """The array of groups, if an element that is solved for is in one; in version 1 entities are as good as groups."""
-    names = (_SETS if _SETS in labels else PHYSICAL, *((_ENTITY,) if file.first else ()))
+    names = (SETS if SETS in labels else PHYSICAL, *((ENTITY,) if file.first else ()))
     return tuple(name for name in names if name in labels and any(labels[name][i].any() for i in solved_runs(cells)))
 
 
@@ -178,7 +178,7 @@ def _load(file: File, tags: Int64, cells: Sequence[Cells], labels: Mapping[str, 
         name = f"{name} step {step}" if name in arrays else name
         arrays[name] = values if section == "NodeData" else np.split(values, ends[:-1])
     groups = {title: np.array([number, dimension]) for dimension, number, title in file.titles}
-    told = PHYSICAL not in labels or (_SETS not in labels and len(groups) == len(file.titles))
+    told = PHYSICAL not in labels or (SETS not in labels and len(groups) == len(file.titles))
     sets = {} if told else _sets(file, cells, labels)
     return Arrays(point, cell, groups, cell_sets=sets, unread=tuple(unread))
 

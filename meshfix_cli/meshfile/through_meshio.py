@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError, together
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
-from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile import foreign, formats, med
 from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.gmsh import cells as gmsh
@@ -51,7 +50,6 @@ _PLAIN = {
     "nastran": {b"CTETRA_": b"CTETRA ", b"CPYRA_": b"CPYRA ", b"CPENTA_": b"CPENTA ", b"CHEXA_": b"CHEXA "},
 }  # fmt: skip
 _NAMES = {"abaqus": rb"(?<=TYPE=)\w+(?=\n)", "nastran": rb"(?m)^\w+"}
-_TURNED = ("vtk", "vtu")
 _WITH_SETS = ("abaqus", "exodus")
 # Which module's clock a writer asks for a remark: with that the same mesh would not have the same bytes.
 _CLOCKS = {
@@ -63,11 +61,6 @@ _NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
 _STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
 _ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
 _ORDERED = ("tetra10", "pyramid13", "wedge15", "hexahedron20", "hexahedron27")  # by meshio itself, for gmsh
-# What it calls elements of more than second order for VTK, in whose order they are.
-_LAGRANGE = {
-    "line": "CURVE", "triangle": "TRIANGLE", "quad": "QUADRILATERAL", "tetra": "TETRAHEDRON", "wedge": "WEDGE",
-    "hexahedron": "HEXAHEDRON",
-}  # fmt: skip
 
 
 def read(data: bytes, form: Format, path: Path | None = None) -> Source:
@@ -163,24 +156,24 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
     region = next((name for name in source.regions if name in arrays.cell), None)
     material = _MATERIALS.get(form.reader)
 
-    def name(text: str, of_cells: bool = False) -> str:
-        if of_cells and material and text in (region, material):  # one array takes the place
-            text = material if text == region or region is None else f"{text} of the input"
-        return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
+    def name(text: str) -> str:
+        if material and text in (region, material):  # one array takes the place
+            return material if text == region or region is None else f"{text} of the input"
+        return text
 
     def values(key: str, array: Any) -> Any:
         if form.reader == "gmsh" and not form.binary and key not in _TAGS:
             return np.asarray(array, dtype=np.float64).astype(object)  # meshio writes the repr, "np.float64(1.0)"
         return array
 
-    cell = {name(key, True): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
+    cell = {name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
     if form.reader in ("medit", "meshb"):  # any integers would be taken for references
         cell = {key: runs for key, runs in cell.items() if key == material}
     sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(
         points,
-        [(_name_in(form, source.cells[i].type), _in_order_of(form, source.cells[i])) for i in kept],
-        point_data={name(key): values("", array) for key, array in arrays.point.items()},
+        [(source.cells[i].type, _in_order_of(form, source.cells[i])) for i in kept],
+        point_data={key: values("", array) for key, array in arrays.point.items()},
         cell_data={key: [values(key, array) for array in runs] for key, runs in cell.items()},
         # The numbers of sets of groups are not those of the groups.
         field_data={} if region == "gmsh:physical_set" else dict(arrays.groups),
@@ -189,22 +182,12 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
     )
 
 
-def _name_in(form: Format, key: str) -> str:
-    """Return what meshio calls cells of a type."""
-    kind = kinds().get(key) if form.reader in _TURNED and key not in ELEMENTS else None
-    return f"VTK_LAGRANGE_{_LAGRANGE[kind.family]}" if kind and kind.complete and kind.family in _LAGRANGE else key
-
-
 def _in_order_of(form: Format, run: Cells) -> Any:
-    """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, and no others."""
+    """Return the vertices of cells so that meshio writes them in the order of the format."""
     order = _ORDERS.get(form.reader, {}).get(run.type)
     if form.reader == "gmsh" and run.type not in _ORDERED:
         order = gmsh.order_of(run.type)
-    if form.reader == "vtu" and run.type not in ELEMENTS and run.type in kinds():
-        order = kinds()[run.type].order_of("vtk 8")  # for meshio calls the file one of an old version
-    if order is not None:
-        return run.vertices[:, np.argsort(order)]
-    return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices
+    return run.vertices if order is None else run.vertices[:, np.argsort(order)]
 
 
 def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, list[NDArray[np.int64]]]:

@@ -9,7 +9,9 @@ from meshfix_cli.meshfile.source import Source
 from meshfix_cli.meshfile.splice import Points
 
 # For each format the module of this folder whose `written(content, form)` returns its bytes.
-WRITERS = {"medit": "medit", "gmsh22": "gmsh", "gmsh": "gmsh", "abaqus": "abaqus"}
+WRITERS = {
+    "medit": "medit", "gmsh22": "gmsh", "gmsh": "gmsh", "abaqus": "abaqus", "vtk": "vtk", "vtk42": "vtk", "vtu": "vtu",
+}  # fmt: skip
 
 
 def written(source: Source, points: Points, form: Format) -> bytes:

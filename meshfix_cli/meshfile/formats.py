@@ -148,7 +148,8 @@ OWN = {
     "xdmf": Own(
         "xdmf", recognise.xdmf, {".xdmf": "xdmf", ".xmf": "xdmf"}, "XDMF",
         "numbers as text, in raw files or in HDF5 beside it; mesh tags of FEniCS, and steps in time of one mesh",
-        "mesh tags of cells, and cell data that are called like a material; sets", "`h5py`, where numbers are in HDF5",
+        "mesh tags of cells, and cell data that are called like a material; sets, also as bytes of 0 and 1",
+        "`h5py`, where numbers are in HDF5",
         beside=True,
     ),
     "med": Own(
@@ -303,8 +304,6 @@ def writers() -> tuple[str, ...]:
 
 def options(form: Format) -> dict[str, object]:
     """Keyword arguments for meshio's writer."""
-    if form.name == "xdmf":
-        return {"data_format": "XML"}  # else the numbers go to a second file
     return {} if form.binary is None else {"binary": form.binary}
 
 

@@ -1,4 +1,4 @@
-"""A mesh as VTK's files hold it: cells by their numbers, sets as bytes that mark them, names of materials beside."""
+"""A mesh as VTK's files and those of XDMF hold it: sets are bytes that mark their members, names stand beside."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from meshfix_cli.meshfile.anew.content import Content
 from meshfix_cli.meshfile.source import regions_among
 from meshfix_cli.meshfile.vtk.cells import number_of, order_of
 
+Arrays = Mapping[str, NDArray[Any]]
 MATERIALS = "MaterialIDs"  # what the array is called where its own name tells no program that it is one
 
 
@@ -36,9 +37,9 @@ class Grid:
     points: NDArray[np.float64]
     types: list[int]
     vertices: list[NDArray[np.int64]]
-    point: Mapping[str, NDArray[Any]]
-    cell: Mapping[str, NDArray[Any]]
-    about: Mapping[str, NDArray[np.int64]]
+    point: Arrays
+    cell: Arrays
+    about: Arrays
 
     @classmethod
     def of(cls, content: Content, old: bool) -> Grid:
@@ -53,16 +54,8 @@ class Grid:
             order = order_of(content.cells[i].type, number) if old else None
             rows = content.cells[i].vertices.astype(np.int64, copy=False)
             vertices.append(rows if order is None else rows[:, np.argsort(order)])
-        rows = [i for i, _ in kept]
-        cell = dict(arrays_of(of_cells(content, rows)))
-        sizes = [len(one) for one in vertices]
-        masks = {name: _marked(sizes, [runs[i] for i in rows]) for name, runs in content.sets.items()}
-        point = dict(arrays_of(content.arrays.point.items()))
-        nodes = {name: _marked([len(content.points)], [one]) for name, one in content.point_sets.items()}
-        about = {name: np.array([number, dimension]) for (dimension, number), name in content.titles.items()}
-        return cls(
-            content.in_space(), [number for _, number in kept], vertices, _with(point, nodes), _with(cell, masks), about
-        )
+        data = data_of(content, [i for i, _ in kept])
+        return cls(content.in_space(), [number for _, number in kept], vertices, *data)
 
     def offsets(self) -> NDArray[np.int64]:
         """Return where the vertices of each cell end."""
@@ -73,7 +66,18 @@ class Grid:
         return np.repeat(np.array(self.types, dtype=np.uint8), [len(one) for one in self.vertices])
 
 
-def of_cells(content: Content, rows: list[int]) -> Iterator[tuple[str, NDArray[Any]]]:
+def data_of(content: Content, kept: list[int]) -> tuple[Arrays, Arrays, Arrays]:
+    """Return data of points and of the cells of some runs, with sets among them, and what tells of groups."""
+    cell = dict(_numbers(_of_cells(content, kept)))
+    sizes = [len(content.cells[i].vertices) for i in kept]
+    masks = {name: _marked(sizes, [runs[i] for i in kept]) for name, runs in content.sets.items()}
+    point = dict(_numbers(content.arrays.point.items()))
+    nodes = {name: _marked([len(content.points)], [one]) for name, one in content.point_sets.items()}
+    about = {name: np.array([number, dimension]) for (dimension, number), name in content.titles.items()}
+    return _with(point, nodes), _with(cell, masks), about
+
+
+def _of_cells(content: Content, rows: list[int]) -> Iterator[tuple[str, NDArray[Any]]]:
     """Give names and values of data of the cells of some runs; that of materials is called so that readers know it."""
     names = content.arrays.cell
     for name, runs in names.items() if rows else ():
@@ -81,7 +85,7 @@ def of_cells(content: Content, rows: list[int]) -> Iterator[tuple[str, NDArray[A
         yield MATERIALS if unknown else name, np.concatenate([np.asarray(runs[i]) for i in rows])
 
 
-def arrays_of(named: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _numbers(named: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
     """Give those that are numbers, each in one of the usual types and in rows."""
     for name, array in named:
         values = np.asarray(array)

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError, together
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
 from meshfix_cli.meshfile import foreign, formats, med
-from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.gmsh import cells as gmsh
 from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.recognise import Format
@@ -50,16 +49,15 @@ _PLAIN = {
     "nastran": {b"CTETRA_": b"CTETRA ", b"CPYRA_": b"CPYRA ", b"CPENTA_": b"CPENTA ", b"CHEXA_": b"CHEXA "},
 }  # fmt: skip
 _NAMES = {"abaqus": rb"(?<=TYPE=)\w+(?=\n)", "nastran": rb"(?m)^\w+"}
-_WITH_SETS = ("abaqus", "exodus")
+_WITH_SETS = ("abaqus",)
 # Which module's clock a writer asks for a remark: with that the same mesh would not have the same bytes.
 _CLOCKS = {
-    "exodus": ("meshio.exodus._exodus", "datetime"),
     "flac3d": ("meshio.flac3d._flac3d", "time"),
     "h5m": ("meshio.h5m._h5m", "datetime"),
 }
 _NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
 _STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
-_ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
+_ORDERS = {"med": med.ORDER}  # which of the format's nodes stands where ours do
 _ORDERED = ("tetra10", "pyramid13", "wedge15", "hexahedron20", "hexahedron27")  # by meshio itself, for gmsh
 
 

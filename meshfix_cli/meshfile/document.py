@@ -437,7 +437,7 @@ def _on_other_cells(solved: Solved, n: int) -> NDArray[np.bool_]:
 
 def _fixed_by(source: Source, name: str) -> NDArray[np.bool_]:
     """Mark the points (n,) that an array or, where there is none of this name, a group holds."""
-    if name in source.arrays.point:
+    if name in source.arrays.point and name not in source.arrays.point_sets:  # which a few arrays are as well
         values = np.asarray(source.arrays.point[name])
         return (values.reshape(len(values), -1) != 0).any(axis=1)
     from meshfix_cli.meshfile.groups import groups_of

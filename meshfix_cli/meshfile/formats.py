@@ -56,7 +56,7 @@ class Own:
 
 # By the name of the reader. A .msh is gmsh's, whatever meshio's default is; a file that becomes one is of version 2.2,
 # which most programs read.
-_VTK_GROUPS = "cell data that are called like a material"
+_VTK_GROUPS = "cell data that are called like a material; bytes of 0 and 1, as sets"
 _LZ4 = "`lz4`, where numbers are compressed so"
 OWN = {
     "stl": Own(
@@ -148,7 +148,8 @@ OWN = {
     "xdmf": Own(
         "xdmf", recognise.xdmf, {".xdmf": "xdmf", ".xmf": "xdmf"}, "XDMF",
         "numbers as text, in raw files or in HDF5 beside it; mesh tags of FEniCS, and steps in time of one mesh",
-        "mesh tags of cells, and cell data that are called like a material; sets", "`h5py`, where numbers are in HDF5",
+        "mesh tags of cells, and cell data that are called like a material; sets, also as bytes of 0 and 1",
+        "`h5py`, where numbers are in HDF5",
         beside=True,
     ),
     "med": Own(
@@ -307,10 +308,6 @@ def writers() -> tuple[str, ...]:
 
 def options(form: Format) -> dict[str, object]:
     """Keyword arguments for meshio's writer."""
-    if form.name == "xdmf":
-        return {"data_format": "XML"}  # else the numbers go to a second file
-    if form.name == "vtu":
-        return {"binary": True}  # meshio's text has 12 digits, which would move fixed vertices
     return {} if form.binary is None else {"binary": form.binary}
 
 

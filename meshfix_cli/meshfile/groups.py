@@ -56,6 +56,11 @@ class Group:
         """Rows (k,) of its points and of the vertices of its cells, ascending, as the file has them."""
         return _distinct([self.nodes, *(_vertices(run, rows) for run, rows in self.cells)])
 
+    def rows(self, source: Source) -> list[Int64]:
+        """Return the rows of its cells in each run of the source that it is of."""
+        mine = {id(run): rows for run, rows in self.cells}
+        return [mine.get(id(run), np.empty(0, dtype=np.int64)) for run in source.cells]
+
 
 def groups_of(source: Source) -> dict[str, Group]:
     """Return the groups of a file by their names, in its order."""
@@ -111,4 +116,5 @@ def _vertices(run: Cells, rows: Int64) -> Int64:
 
 
 def _distinct(parts: Sequence[Int64]) -> Int64:
-    return np.unique(np.concatenate(parts)) if len(parts) != 1 else np.unique(parts[0])
+    rows = np.concatenate(parts) if len(parts) != 1 else parts[0]
+    return rows if (rows[1:] > rows[:-1]).all() else np.unique(rows)  # most are in order

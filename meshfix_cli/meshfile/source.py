@@ -247,6 +247,28 @@ class Source:
         arrays = replace(mine, cell=cell, cell_sets=sets)
         return replace(self, cells=cells, load=lambda: arrays)
 
+    def in_order(self) -> Source:
+        """Return the same with one run for all cells of a type, ordered by their numbers; itself if they stand so."""
+        runs: dict[tuple[str, int], list[NDArray[np.int64]]] = {}
+        for run in self.cells:
+            if run.ids is None or not isinstance(run.vertices, np.ndarray):
+                return self
+            runs.setdefault((run.type, run.vertices.shape[1]), []).append(run.ids)
+        orders = [np.argsort(np.concatenate(ids), kind="stable") for ids in runs.values()]
+        if all((order[1:] > order[:-1]).all() for order in orders):
+            return self
+        whole = self.merged()
+        mine = whole.arrays
+        pairs = list(enumerate(orders))
+        cells = [replace(whole.cells[i], vertices=whole.cells[i].vertices[order]) for i, order in pairs]
+        cell = {name: [values[i][order] for i, order in pairs] for name, values in mine.cell.items()}
+        sets = {
+            name: [np.flatnonzero(np.isin(order, rows[i])) for i, order in pairs]
+            for name, rows in mine.cell_sets.items()
+        }
+        arrays = replace(mine, cell=cell, cell_sets=sets)
+        return replace(whole, cells=cells, load=lambda: arrays)
+
     def _starts(self, runs: Sequence[int]) -> list[int]:
         """How many cells stand before each of some runs when these are joined."""
         return [0, *accumulate(len(self.cells[i].vertices) for i in runs[:-1])]

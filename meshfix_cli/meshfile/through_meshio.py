@@ -7,7 +7,6 @@ import errno
 import gc
 import io
 import os
-import re
 import tempfile
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
@@ -23,9 +22,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, ReadError, WriteError, together
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of, words
-from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile import foreign, formats, med
-from meshfix_cli.meshfile.exodus import types as exodus
 from meshfix_cli.meshfile.plainly import plainly
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import solved_runs
@@ -40,22 +37,14 @@ _KNOWN = frozenset(meshio._mesh.topological_dimension)
 _COMMON = frozenset(key for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1) & _KNOWN
 _OF_THE_DEVICE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 _MATERIALS = {"meshb": "medit:ref"}
-_TURNED = ("vtk", "vtu")
-_WITH_SETS = ("exodus",)
 # Which module's clock a writer asks for a remark: with that the same mesh would not have the same bytes.
 _CLOCKS = {
-    "exodus": ("meshio.exodus._exodus", "datetime"),
     "flac3d": ("meshio.flac3d._flac3d", "time"),
     "h5m": ("meshio.h5m._h5m", "datetime"),
 }
 _NOW = SimpleNamespace(now=lambda: datetime(1970, 1, 1))
 _STILL = SimpleNamespace(ctime=lambda: "", datetime=_NOW, now=_NOW.now)  # for a module, or for a class in it
-_ORDERS = {"med": med.ORDER, "exodus": exodus.ORDER}  # which of the format's nodes stands where ours do
-# What it calls elements of more than second order for VTK, in whose order they are.
-_LAGRANGE = {
-    "line": "CURVE", "triangle": "TRIANGLE", "quad": "QUADRILATERAL", "tetra": "TETRAHEDRON", "wedge": "WEDGE",
-    "hexahedron": "HEXAHEDRON",
-}  # fmt: skip
+_ORDERS = {"med": med.ORDER}  # which of the format's nodes stands where ours do
 
 
 def read(data: bytes, form: Format, path: Path | None = None) -> Source:
@@ -148,59 +137,28 @@ def _mesh(source: Source, points: NDArray[np.floating[Any]], arrays: Arrays, kep
     region = next((name for name in source.regions if name in arrays.cell), None)
     material = _MATERIALS.get(form.reader)
 
-    def name(text: str, of_cells: bool = False) -> str:
-        if of_cells and material and text in (region, material):  # one array takes the place
-            text = material if text == region or region is None else f"{text} of the input"
-        return "_".join(text.split()) if form.reader == "vtk" else text  # where a blank ends a name
+    def name(text: str) -> str:
+        if material and text in (region, material):  # one array takes the place
+            return material if text == region or region is None else f"{text} of the input"
+        return text
 
-    cell = {name(key, True): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
+    cell = {name(key): [runs[i] for i in kept] for key, runs in arrays.cell.items()}
     if form.reader == "meshb":  # any integers would be taken for references
         cell = {key: runs for key, runs in cell.items() if key == material}
-    sets = {**arrays.cell_sets, **_materials(source, arrays, region)} if form.name in _WITH_SETS else {}
     return meshio.Mesh(
         points,
-        [(_name_in(form, source.cells[i].type), _in_order_of(form, source.cells[i])) for i in kept],
-        point_data={name(key): array for key, array in arrays.point.items()},
+        [(source.cells[i].type, _in_order_of(form, source.cells[i])) for i in kept],
+        point_data=dict(arrays.point),
         cell_data=cell,
         # The numbers of sets of groups are not those of the groups.
         field_data={} if region == "gmsh:physical_set" else dict(arrays.groups),
-        point_sets=dict(arrays.point_sets) if form.name in _WITH_SETS else {},
-        cell_sets={key: [runs[i] for i in kept] for key, runs in sets.items()},
     )
 
 
-def _name_in(form: Format, key: str) -> str:
-    """Return what meshio calls cells of a type."""
-    kind = kinds().get(key) if form.reader in _TURNED and key not in ELEMENTS else None
-    return f"VTK_LAGRANGE_{_LAGRANGE[kind.family]}" if kind and kind.complete and kind.family in _LAGRANGE else key
-
-
 def _in_order_of(form: Format, run: Cells) -> Any:
-    """Return the vertices of cells so that meshio writes them as they are: it turns wedges for VTK, and no others."""
+    """Return the vertices of cells so that meshio writes them in the order of the format."""
     order = _ORDERS.get(form.reader, {}).get(run.type)
-    if form.reader == "vtu" and run.type not in ELEMENTS and run.type in kinds():
-        order = kinds()[run.type].order_of("vtk 8")  # for meshio calls the file one of an old version
-    if order is not None:
-        return run.vertices[:, np.argsort(order)]
-    return run.vertices[:, [0, 2, 1, 3, 5, 4]] if run.type == "wedge" and form.reader in _TURNED else run.vertices
-
-
-def _materials(source: Source, arrays: Arrays, region: str | None) -> dict[str, list[NDArray[np.int64]]]:
-    """For each material, by the name of its group, the rows of the cells in each run."""
-    titles = {
-        (int(number), int(dimension)): re.sub(r"[^\w.-]+", "_", title)  # what Abaqus takes for one name
-        for title, (number, dimension) in arrays.groups.items()
-    }
-    used = [title.upper() for title in titles.values()]  # it does not tell small letters from capitals
-    sets: dict[str, list[NDArray[np.int64]]] = {}
-    for i, labels in enumerate(arrays.cell[region] if region else ()):
-        dimension = meshio._mesh.topological_dimension.get(source.cells[i].type, -1)
-        for label in np.unique(labels).tolist():
-            title = titles.get((label, dimension), "REGION") if region == "gmsh:physical" else "REGION"
-            title = title if used.count(title.upper()) == 1 else f"{title}_{label}"
-            rows = sets.setdefault(title, [np.empty(0, dtype=np.int64)] * len(source.cells))
-            rows[i] = np.flatnonzero(labels == label)
-    return sets
+    return run.vertices if order is None else run.vertices[:, np.argsort(order)]
 
 
 def source_of(mesh: Any) -> Source:

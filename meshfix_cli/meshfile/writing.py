@@ -290,7 +290,7 @@ def _write_anew(
     held = points.astype(np.float64)
     size = float(np.ptp(held[expected], axis=0).max())
     try:
-        back = parse(path.read_bytes(), form, path)
+        back = parse(path.read_bytes(), form, path).in_order()  # some formats part what belongs to several materials
         found = [back.vertices_of(run.type, run.vertices.shape[1]) for run in runs]
         lacking = next((run for run, rows in zip(runs, found, strict=True) if not len(rows)), None)
         if lacking is not None:

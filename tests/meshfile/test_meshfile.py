@@ -291,7 +291,8 @@ def test_other_formats_by_extension(tmp_path: Path, plate: Mesh, suffix: str) ->
 def test_conversions_keep_the_materials(tmp_path: Path, suffix: str) -> None:
     document = read(SAMPLES / "two_materials.msh")
     _, dropped = write(document, untangle(document.mesh).after, tmp_path / f"out{suffix}")
-    assert dropped == ("group steel", "group copper", "comments")
+    held = suffix != ".mesh"
+    assert dropped == (*(("group steel", "group copper") if not held else ()), "comments")
     after = read(tmp_path / f"out{suffix}")
     np.testing.assert_array_equal(after.mesh.movable, document.mesh.movable)
     assert sorted(after.fixed.values()) == sorted(document.fixed.values())

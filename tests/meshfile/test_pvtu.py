@@ -385,9 +385,9 @@ def test_no_piece_of_the_input_is_replaced_but_in_place(tmp_path: Path) -> None:
 
 def test_other_formats_get_the_joined_mesh(tmp_path: Path) -> None:
     path = made(tmp_path, ids=True, ghosts=True)
-    done = run("untangle", path, tmp_path / "out.vtk")
-    assert b"converted from pvtu to vtk" in done.stdout
-    mesh = meshio.read(tmp_path / "out.vtk")
+    done = run("untangle", path, tmp_path / "out.vtu")
+    assert b"converted from pvtu to vtu" in done.stdout
+    mesh = meshio.read(tmp_path / "out.vtu")
     points, cells = block()
     assert len(mesh.points) == len(points)
     assert len(mesh.get_cells_type("tetra")) == len(cells)

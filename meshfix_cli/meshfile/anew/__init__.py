@@ -11,6 +11,7 @@ from meshfix_cli.meshfile.splice import Points
 # For each format the module of this folder whose `written(content, form)` returns its bytes.
 WRITERS = {
     "medit": "medit", "gmsh22": "gmsh", "gmsh": "gmsh", "abaqus": "abaqus", "nastran": "nastran", "su2": "su2",
+    "vtk": "vtk", "vtk42": "vtk", "vtu": "vtu", "xdmf": "xdmf", "exodus": "exodus",
 }  # fmt: skip
 
 

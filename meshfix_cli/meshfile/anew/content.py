@@ -17,6 +17,8 @@ from meshfix_cli.meshfile.splice import Points
 
 Int64 = NDArray[np.int64]
 
+IN_XML = " -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff"  # the characters of names there, see `words_of`
+
 
 @dataclass(frozen=True, eq=False)
 class Content:

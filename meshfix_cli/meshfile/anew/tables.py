@@ -16,7 +16,8 @@ def lines(form: str, *columns: NDArray[Any]) -> bytes:
 
     `form` is for all values of a row and the end of its line; %r gives the shortest number that reads back.
     """
-    values = [one.tolist() for array in columns for one in np.asarray(array).reshape(len(array), -1).T]
+    tables = [array[:, None] if array.ndim == 1 else array for array in columns]
+    values = [one.tolist() for table in tables for one in table.T]
     return "".join([form % row for row in zip(*values, strict=True)]).encode()
 
 
@@ -105,3 +106,14 @@ def numbered(numbers: NDArray[Any], values: NDArray[np.float64], between: str = 
 def form_of(reals: int, integers: int) -> str:
     """Return the form of a line of so many reals, and of integers behind them, with blanks between."""
     return " ".join(["%r"] * reals + ["%d"] * integers) + "\n"
+
+
+def rows_of(values: NDArray[Any], width: int = 12) -> bytes:
+    """Return the rows of a table (n, k) in lines; numbers (n,) with so many in each."""
+    write = reals if values.dtype.kind == "f" else integers
+    if not values.size or values.ndim > 1:
+        return write(values) if values.size else b""
+    whole = len(values) - len(values) % width
+    rest = values[None, whole:]
+    parts = (values[:whole].reshape(-1, width), rest)
+    return b"".join([write(part) for part in parts if part.size])

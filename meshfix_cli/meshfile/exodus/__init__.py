@@ -16,8 +16,8 @@ from functools import partial
 import numpy as np
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.exodus.blocks import Block, Named, Run, blocks, numbers
-from meshfix_cli.meshfile.exodus.sets import BLOCK, arrays
+from meshfix_cli.meshfile.exodus.blocks import Block, Named, Run, blocks, numbers, titles
+from meshfix_cli.meshfile.exodus.sets import arrays, regions_of
 from meshfix_cli.meshfile.exodus.variables import Variables, opened
 from meshfix_cli.meshfile.hdf5 import Table
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
@@ -52,7 +52,8 @@ def source_of(variables: Variables, again: Callable[[], AbstractContextManager[V
         ids = np.arange(1, sum(block.size for block in found) + 1)
     cells = [Cells(run.type, run.vertices, ids[run.rows + block.first]) for block, run in runs]
     load = partial(_arrays, again, found, n, dimension)
-    return Source(np.ascontiguousarray(flat[table.at]), cells, layout, load, (BLOCK,), untold=untold)
+    regions = regions_of(titles(named, "name_elem_var"))
+    return Source(np.ascontiguousarray(flat[table.at]), cells, layout, load, regions, untold=untold)
 
 
 def _coordinates(named: Named) -> Table:

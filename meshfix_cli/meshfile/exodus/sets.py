@@ -6,7 +6,7 @@ Source: L. A. Schoof, V. R. Yarberry, "EXODUS II: a finite element data model", 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import dimension_of
 from meshfix_cli.meshfile.exodus.blocks import Block, Int64, Named, numbers, titles
 from meshfix_cli.meshfile.exodus.types import ORDER, sides_of
-from meshfix_cli.meshfile.source import Arrays
+from meshfix_cli.meshfile.source import REGIONS, Arrays
 
 BLOCK = "exodus:block"
 
@@ -24,15 +24,49 @@ BLOCK = "exodus:block"
 def arrays(variables: Named, found: Sequence[Block], points: int, dimension: int) -> Arrays:
     """Return blocks as regions and groups, sets, and the fields of the last time step."""
     runs = [(block, run) for block in found for run in block.runs]
-    cell: dict[str, Sequence[NDArray[Any]]] = dict(_fields_of_cells(variables, found))
-    cell[BLOCK] = [np.full(len(run.rows), block.number) for block, run in runs]
+    cell: dict[str, Sequence[NDArray[Any]]] = dict(_vectors(dict(_fields_of_cells(variables, found))))
+    labels = {name: [_whole(values) for values in cell[name]] for name in regions_of(list(cell)) if name in cell}
+    blocks = {BLOCK: [np.full(len(run.rows), block.number) for block, run in runs]}
+    of_points = {name: [values] for name, values in _fields_of_points(variables, points)}
+    groups = dict(_groups(variables, found, dimension))
+    sets = dict(_cell_sets(variables, found))
+    if labels:  # the numbers of which blocks have not
+        of_blocks = {
+            name: [np.arange(len(run.rows) if block.number == number else 0) for block, run in runs]
+            for name, (number, _) in groups.items()
+        }
+        groups, sets = {}, {**of_blocks, **sets}
     return Arrays(
-        dict(_fields_of_points(variables, points)),
-        cell,
-        dict(_groups(variables, found, dimension)),
+        {name: values for name, (values,) in _vectors(of_points).items()},
+        {**cell, **blocks, **labels},
+        groups,
         _point_sets(variables, found, dimension),
-        dict(_cell_sets(variables, found)),
+        sets,
     )
+
+
+def regions_of(names: Sequence[str]) -> tuple[str, ...]:
+    """Return what tells materials apart: blocks, if no field does under a name that only such have."""
+    return tuple(name for name in REGIONS if name in names) or (BLOCK,)
+
+
+def _whole(values: NDArray[Any]) -> NDArray[Any]:
+    """Return labels, which fields hold as reals."""
+    return values.astype(np.int64) if (values == np.round(values)).all() else values
+
+
+def _vectors(fields: Mapping[str, Sequence[NDArray[Any]]]) -> dict[str, list[NDArray[Any]]]:
+    """Return fields, in runs, with those as one whose names end in _x, _y and, if there is one, _z."""
+    found: dict[str, list[NDArray[Any]]] = {}
+    for name in fields:
+        stem, end = name[:-2], name[-2:]
+        ends = [one for one in ("_x", "_y", "_z") if stem + one in fields]
+        if end not in ends or ends[:2] != ["_x", "_y"] or stem in fields:
+            found[name] = list(fields[name])
+        elif end == "_x":
+            columns = zip(*(fields[stem + one] for one in ends), strict=True)
+            found[stem] = [np.column_stack(of_run) for of_run in columns]
+    return found
 
 
 def _groups(variables: Named, found: Sequence[Block], dimension: int) -> Iterator[tuple[str, list[int]]]:

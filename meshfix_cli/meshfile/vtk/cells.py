@@ -36,6 +36,9 @@ _HEXAHEDRON = 72
 POLYDATA: dict[bytes, tuple[int, dict[int, int]]] = {
     b"vertices": (2, {1: 1}), b"lines": (4, {2: 3}), b"polygons": (7, {3: 5, 4: 9}), b"triangle_strips": (6, {})
 }  # fmt: skip
+# What VTK calls the types that can be told by their vertices alone: polyhedra have faces as well.
+_NUMBERS = {name: number for number, (name, _) in TYPES.items() if name not in ("empty", "polyhedron")}
+_OF_FAMILY = {family: number for number, family in _LAGRANGE.items()}
 GHOSTS = frozenset({"vtkGhostType", "vtkGhostLevels"})  # arrays that mark cells which other pieces have as well
 
 
@@ -104,9 +107,20 @@ def runs(
             vertices = connectivity[offsets[rows[0]] : offsets[rows[-1] + 1]].reshape(len(rows), size)
         else:
             vertices = connectivity[offsets[rows][:, None] + np.arange(size)]
-        order = kinds()[name].order_of("vtk 8") if old and number == _HEXAHEDRON and name in kinds() else None
+        order = order_of(name, number) if old else None
         found.append(Run(name, rows, vertices if order is None else vertices[:, order], order))
     return found
+
+
+def number_of(key: str) -> int | None:
+    """Return VTK's number of a type; None: it has none, or cells of it cannot be told by their vertices."""
+    kind = None if key in _NUMBERS else kinds().get(key)
+    return _OF_FAMILY.get(kind.family) if kind and kind.complete else _NUMBERS.get(key)
+
+
+def order_of(key: str, number: int) -> list[int] | None:
+    """Return which of the vertices in an old file stands in each place, where that is another order."""
+    return kinds()[key].order_of("vtk 8") if number == _HEXAHEDRON and key in kinds() else None
 
 
 def types_of_sizes(sizes: NDArray[np.int64], other: int, known: Mapping[int, int]) -> NDArray[np.int64]:
@@ -138,6 +152,35 @@ def _lagrange(family: str, size: int) -> str | None:
         return family
     kind = kinds().get(f"{family}{size}")
     return f"{family}{size}" if kind and kind.complete else None
+
+
+def groups_among(about: Mapping[str, NDArray[Any]], regions: Sequence[str]) -> dict[str, list[int]]:
+    """Return which field data are names of regions: those of two integers, its number and its dimension."""
+    return {name: values.tolist() for name, values in about.items() if regions and is_of_group(values)}
+
+
+def is_of_group(values: NDArray[Any]) -> bool:
+    """Whether field data may be the number and the dimension of a group."""
+    return values.dtype.kind in "iu" and values.size == 2 and values.ravel()[1] in range(4)
+
+
+def sets_among(arrays: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[np.int64]]:
+    """Return the rows of what bytes of 0 and 1 mark, as programs write selections; no materials and no ghosts."""
+    regions = regions_among(list(arrays))
+    return {
+        name: np.flatnonzero(values)
+        for name, values in arrays.items()
+        if values.dtype == np.uint8 and values.ndim == 1 and values.max(initial=0) < 2
+        if name not in regions and not name.startswith("vtk")
+    }
+
+
+def sets_of_runs(
+    cell: Mapping[str, Sequence[NDArray[Any]]],
+) -> dict[str, list[NDArray[np.int64]]]:
+    """Return the same of cells, in each run."""
+    joined = {name: np.concatenate(runs) for name, runs in cell.items() if runs}
+    return {name: [np.flatnonzero(mask) for mask in cell[name]] for name in sets_among(joined)}
 
 
 def markings(

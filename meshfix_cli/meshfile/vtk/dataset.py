@@ -20,10 +20,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import Arrays, Source, ghost_vertices
+from meshfix_cli.meshfile.source import Arrays, Source, ghost_vertices, regions_among
 from meshfix_cli.meshfile.splice import Points, Turned, differing
 from meshfix_cli.meshfile.vtk.arrays import Payload
-from meshfix_cli.meshfile.vtk.cells import Run, markings, runs
+from meshfix_cli.meshfile.vtk.cells import (
+    Run,
+    groups_among,
+    is_of_group,
+    markings,
+    runs,
+    sets_among,
+    sets_of_runs,
+)
 from meshfix_cli.meshfile.vtk.xml import Element, XmlFile
 
 # What VTK and its readers call the numbers of points that are those of all pieces, where it is not declared.
@@ -67,11 +75,12 @@ def parse(data: bytes, kind: DataSet) -> Source:
     found = runs(cells.types, cells.offsets, cells.connectivity, old)
     starts = [cells.offsets[run.rows] for run in found]
     layout = _Layout(file, points.dtype, shares, cells.shares, starts, [run.order for run in found])
-    load = cache(lambda: _arrays(file, pieces, found, cells.order))
+    about = _about(file, kind.tag)
+    load = cache(lambda: _arrays(file, pieces, found, cells.order, about))
     labels = {array.name for piece in pieces for array in piece.arrays("CellData")}
     damaged = "is not a readable VTK file: its cell data {} are damaged, or not those of all pieces"
     regions, marked = markings(labels, [run.cells for run in found], lambda: load().cell, damaged)
-    held, untold = ghost_vertices(marked, len(points)), _untold(file, pieces, kind.tag)
+    held, untold = ghost_vertices(marked, len(points)), _untold(file, pieces, kind.tag, about)
     return Source(
         points, marked, layout, load, regions, held, untold, numbers=lambda: _global_ids(file, pieces),
         oriented=kind.oriented,
@@ -268,7 +277,23 @@ def _global_ids(file: XmlFile, pieces: Sequence[Piece]) -> NDArray[np.int64] | N
     return np.concatenate(found) if found else None
 
 
-def _arrays(file: XmlFile, pieces: Sequence[Piece], found: Sequence[Run], order: NDArray[np.int64] | None) -> Arrays:
+def _about(file: XmlFile, tag: str) -> dict[str, NDArray[Any]]:
+    """Return the field data that may be the numbers and dimensions of groups."""
+    found = {}
+    for array in file.root.named(tag, "FieldData", "DataArray"):
+        if array.kind and array.attributes.get("NumberOfTuples", "").strip() == "2":
+            with suppress(ReadError):
+                found[array.name] = _values(file, array, 2)
+    return {name: values for name, values in found.items() if is_of_group(values)}
+
+
+def _arrays(
+    file: XmlFile,
+    pieces: Sequence[Piece],
+    found: Sequence[Run],
+    order: NDArray[np.int64] | None,
+    about: Mapping[str, NDArray[Any]],
+) -> Arrays:
     point = _joined(file, [(piece.arrays("PointData"), piece.points) for piece in pieces if piece.points])
     cell = _joined(file, [(piece.arrays("CellData"), piece.cells) for piece in pieces if piece.cells])
     unread = [
@@ -280,7 +305,8 @@ def _arrays(file: XmlFile, pieces: Sequence[Piece], found: Sequence[Run], order:
     ]
     rows = [run.rows if order is None else order[run.rows] for run in found]
     by_run = {name: [values[here] for here in rows] for name, values in cell.items()}
-    return Arrays(point, by_run, unread=tuple(dict.fromkeys(unread)))
+    groups = groups_among(about, regions_among(cell))
+    return Arrays(point, by_run, groups, sets_among(point), sets_of_runs(by_run), tuple(dict.fromkeys(unread)))
 
 
 def _joined(file: XmlFile, parts: Iterable[tuple[Sequence[Element], int]]) -> dict[str, NDArray[Any]]:
@@ -306,11 +332,13 @@ def _values(file: XmlFile, array: Element, rows: int) -> NDArray[Any]:
     return values if columns == 1 else values.reshape(rows, columns)
 
 
-def _untold(file: XmlFile, pieces: Sequence[Piece], tag: str) -> tuple[str, ...]:
+def _untold(file: XmlFile, pieces: Sequence[Piece], tag: str, about: Mapping[str, NDArray[Any]]) -> tuple[str, ...]:
     sections = [one for piece in pieces for one in piece.element.children if one.tag in ("PointData", "CellData")]
     found = {
         "comments": file.comments,
-        "field data": any(one.children for one in file.root.named(tag, "FieldData")),
+        "field data": any(
+            array.name not in about for one in file.root.named(tag, "FieldData") for array in one.children
+        ),
         "strings and bits": any(array.kind is None for section in sections for array in section.children),
     }
     return tuple(name for name, there in found.items() if there)

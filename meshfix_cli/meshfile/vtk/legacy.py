@@ -16,10 +16,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices
+from meshfix_cli.meshfile.source import Arrays, Cells, Source, ghost_vertices, regions_among
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import chain
-from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, Run, in_rows, markings, runs, types_of_sizes
+from meshfix_cli.meshfile.vtk.cells import (
+    POLYDATA,
+    TYPES,
+    Run,
+    groups_among,
+    in_rows,
+    is_of_group,
+    markings,
+    runs,
+    sets_among,
+    sets_of_runs,
+    types_of_sizes,
+)  # fmt: skip
 from meshfix_cli.meshfile.vtk.sections import Array, Sections, find_sections
 
 _POLYHEDRON = 42
@@ -48,7 +60,8 @@ def parse(data: bytes) -> Source | None:
     found_cells = [_cells(*pair, here) for pair, here in zip(pairs, rows, strict=True)]
     regions, cells = markings(named, found_cells, lambda: load().cell, damaged)
     held = ghost_vertices(cells, points.tuples)
-    untold = dict.fromkeys(["field data"] * bool(found.arrays[b"dataset"]) + found.untold)
+    others = len(_about(found)) < len(found.arrays[b"dataset"])
+    untold = dict.fromkeys(["field data"] * others + found.untold)
     return Source(
         points.values().reshape(-1, 3), cells, layout, load, regions, held, tuple(untold),
         oriented=found.dataset != b"structured_grid",  # indices may run either way
@@ -189,7 +202,14 @@ def _arrays(found: Sections, points: int, rows: Sequence[NDArray[np.int64]]) -> 
     unread = [f"point data {array.name}" for array in found.arrays[b"point_data"] if array.name not in point]
     unread += [f"cell data {array.name}" for array in found.arrays[b"cell_data"] if array.name not in cell]
     by_run = {name: [values[here] for here in rows] for name, values in cell.items()}
-    return Arrays(point, by_run, unread=tuple(unread))
+    groups = groups_among(_about(found), regions_among(cell))
+    return Arrays(point, by_run, groups, sets_among(point), sets_of_runs(by_run), tuple(unread))
+
+
+def _about(found: Sections) -> dict[str, NDArray[Any]]:
+    """Return the field data that may be the numbers and dimensions of groups."""
+    values = dict(_readable(found.arrays[b"dataset"], 2))
+    return {name: pair for name, pair in values.items() if is_of_group(pair)}
 
 
 def _readable(arrays: Sequence[Array], tuples: int) -> Iterator[tuple[str, NDArray[Any]]]:

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from meshfix_cli.errors import ReadError, WriteError
+from meshfix_cli.meshfile.groups import groups_of
 from meshfix_cli.meshfile.source import Arrays, Source
 from meshfix_cli.meshfile.vtk.pvtu import Index, Kind, read_index
 from meshfix_cli.meshfile.vtk.xml import Element, XmlFile
@@ -105,5 +106,6 @@ def _arrays(source: Source, name: str, number: int, regions: Sequence[str]) -> A
     sizes = [len(run.vertices) for run in source.cells]
     labels = {one: [np.zeros(size, dtype=np.int64) for size in sizes] for one in regions}
     cell = {**labels, **source.arrays.cell, _BLOCK: [np.full(size, number) for size in sizes]}
-    sets = {**source.arrays.cell_sets, name: [np.arange(size) for size in sizes]}
-    return replace(source.arrays, cell=cell, cell_sets=sets)
+    numbered = {key: group.rows(source) for key, group in groups_of(source).items() if key in source.arrays.groups}
+    sets = {**numbered, **source.arrays.cell_sets, name: [np.arange(size) for size in sizes]}
+    return replace(source.arrays, cell=cell, groups={}, cell_sets=sets)  # blocks are numbered, and no groups

@@ -8,10 +8,12 @@ Source: XDMF, "XDMF Model and Format".
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from html import unescape
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
@@ -28,12 +30,14 @@ from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
 from meshfix_cli.meshfile.splice import apply
 from meshfix_cli.meshfile.together import Together
 from meshfix_cli.meshfile.vtk.arrays import replacement
+from meshfix_cli.meshfile.vtk.cells import groups_among, sets_among, sets_of_runs
 from meshfix_cli.meshfile.vtk.xml import Element, XmlFile
 from meshfix_cli.meshfile.xdmf.cells import Run, Topology, topology_of
 from meshfix_cli.meshfile.xdmf.items import Beside, Contents, files_named, item_of
 from meshfix_cli.meshfile.xdmf.layout import Divided, Geometry, geometry_of, points_and_layout
 from meshfix_cli.meshfile.xdmf.tree import Grid, Tree, said
 
+_MAP = re.compile(r'<map key="([^"]*)" dim="([0-3])">\s*(-?\d{1,18})\s*</map>')
 _LABELS = ("name_to_read",)  # what FEniCS's tutorials call the labels of cells
 
 
@@ -214,12 +218,32 @@ class _Mesh:
                     point.setdefault(name, values)
         cell = {name: self._filled(found) for name, found in parts.items()}
         point_sets, cell_sets = self._sets(n)
-        return Arrays(point, cell, {}, point_sets, cell_sets, tuple(dict.fromkeys(unread)))
+        return Arrays(
+            point,
+            cell,
+            groups_among(self._told(), regions_among(cell)),
+            {**sets_among(point), **point_sets},
+            {**sets_of_runs(cell), **cell_sets},
+            tuple(dict.fromkeys(unread)),
+        )
+
+    def _told(self) -> dict[str, NDArray[np.int64]]:
+        """Return what meshio tells of groups: their numbers and dimensions."""
+        texts = [self.tree.data[one.begin : one.end] for entry in self.entries for one in entry.grid.told]
+        plain = (text.decode("utf-8", "replace") for text in texts)
+        inner = (text if "<![CDATA[" in text else unescape(text) for text in plain)
+        return {
+            unescape(name): np.array([int(number), int(dimension)])
+            for name, dimension, number in _MAP.findall("".join(inner))
+        }
 
     def _values(self, attribute: Element, count: int) -> NDArray[Any] | None:
         """Return the values (count,) or (count, k) of an attribute; None: they are others, or damaged."""
         with suppress(ReadError):
-            values = self.contents.read(item_of(self.tree, attribute))
+            item = item_of(self.tree, attribute)
+            values = self.contents.read(item)
+            if item.dtype == np.uint8 and values.max(initial=0) < 2 <= 2 + values.min(initial=0):
+                values = values.astype(np.uint8)  # which marks a set
             if count and values.size and values.size % count == 0:
                 return values if values.size == count else values.reshape(count, -1)
         return None

@@ -27,11 +27,22 @@ _NUMBERS = {
     41: ("wedge18", 18), 48: ("hexahedron20", 20), 49: ("hexahedron24", 24), 50: ("hexahedron27", 27),
     51: ("hexahedron_of_64", 64), 52: ("hexahedron_of_125", 125),
 }  # fmt: skip
+# The other way round: what stands before each cell of a type. Of what is named by its number of nodes the order is not
+# known.
+HEADS = {
+    key: [number] if nodes else [number, ELEMENTS[key].nodes]
+    for number, (key, nodes) in {**_NUMBERS, 2: ("line", 0)}.items()
+    if key in ELEMENTS and ELEMENTS[key].nodes
+}
 _POLYHEDRON = 16  # its faces follow, each with the number of its vertices
 _SHAPES = {
     "edge": "line", "line": "line", "interval": "line", "tri": "triangle", "triangle": "triangle", "quad": "quad",
     "quadrilateral": "quad", "tet": "tetra", "tetra": "tetra", "tetrahedron": "tetra", "pyramid": "pyramid",
     "wedge": "wedge", "hex": "hexahedron", "hexahedron": "hexahedron",
+}  # fmt: skip
+_TITLES = {
+    "line": "Edge", "triangle": "Triangle", "quad": "Quadrilateral", "tetra": "Tetrahedron", "pyramid": "Pyramid",
+    "wedge": "Wedge", "hexahedron": "Hexahedron",
 }  # fmt: skip
 _STRUCTURED = re.compile("[23]d(smesh|rectmesh|corectmesh)")
 
@@ -102,6 +113,15 @@ def topology_of(tree: Tree, element: Element, contents: Contents) -> Topology:
         text = " ".join(announced)
         raise ReadError(f"is not a readable xdmf file: it announces {text} cells and has {topology.cells:,}")
     return topology
+
+
+def titled(key: str) -> str:
+    """Return the attributes of a topology whose cells all are of a type in `HEADS`."""
+    if key in ("vertex", "line"):
+        return f'TopologyType="Poly{key}" NodesPerElement="{ELEMENTS[key].nodes}"'
+    shape = next(shape for shape in _TITLES if key.startswith(shape))
+    nodes = key[len(shape) :]
+    return f'TopologyType="{_TITLES[shape]}{"_" if nodes else ""}{nodes}"'
 
 
 def _nodes(element: Element) -> int | None:

@@ -28,6 +28,7 @@ class Grid(NamedTuple):
     topology: Element
     attributes: Sequence[Element]
     sets: Sequence[Element]
+    told: Sequence[Element]
 
 
 def said(element: Element, *names: str) -> str:
@@ -74,8 +75,8 @@ class Tree:
             geometry, topology = self.within(grid, "Geometry"), self.within(grid, "Topology")
             if geometry and topology:
                 attributes, sets = self.within(grid, "Attribute"), self.within(grid, "Set")
-                timed = bool(self.within(grid, "Time"))
-                yield Grid(grid.name, timed, geometry[0], topology[0], attributes, sets)
+                timed, told = bool(self.within(grid, "Time")), self.within(grid, "Information")
+                yield Grid(grid.name, timed, geometry[0], topology[0], attributes, sets, told)
 
     def within(self, element: Element, tag: str) -> list[Element]:
         """Return the elements of a tag in one, also those that stand elsewhere and are included."""

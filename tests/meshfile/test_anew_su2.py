@@ -63,6 +63,19 @@ def test_all_elements_arrive(name: str, tmp_path: Path) -> None:
             np.testing.assert_array_equal(mesh.cells_dict[key], rows)
 
 
+def test_other_cells_are_left_out(tmp_path: Path) -> None:
+    points, cells = MESHES["quads and triangles"]()
+    empty, polygon = np.empty((0, 3), dtype=np.int64), np.array([[0, 1, 2, 3, 4]])
+    runs = [
+        *(Cells(key, rows) for key, rows in cells),
+        Cells("polygon", polygon),
+        Cells("line", empty[:, :2]),
+        Cells("triangle", empty),
+    ]
+    _, lost = written_as(Source(points, runs), FORM, tmp_path / "out.su2")
+    assert "polygon cells" in lost
+
+
 def test_surfaces_in_space_have_no_place(tmp_path: Path) -> None:
     points, cells = MESHES["quads and triangles"]()
     bent = np.column_stack([points, np.sin(points[:, 0])])

@@ -18,7 +18,7 @@ from meshfix_cli.meshfile.anew.tables import integers, reals
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Cells
 
-_TYPES = {key: element.vtk for key, element in ELEMENTS.items() if element.linear and element.shape.dimension}
+_TYPES = {key: element.vtk for key, element in ELEMENTS.items() if element.linear and element.shape.corners > 1}
 _REST = "unmarked"  # facets that are in no group
 
 

@@ -33,10 +33,12 @@ def integers(*columns: NDArray[Any], between: str = " ", longest: int = 0) -> by
     longest : int
         How many a line may hold: behind so many a row goes on with the next line. 0: any.
     """
-    table = np.hstack([np.asarray(array).reshape(len(array), -1) for array in columns])
+    table = np.hstack([array[:, None] if array.ndim == 1 else array for array in columns])
     width = table.shape[1]
     ends = [between.rstrip() + "\n" if longest and i % longest == 0 else between for i in range(1, width)] + ["\n"]
-    if not len(table) or table.min() < 0 or table.max() >= 2**32:
+    if not len(table):
+        return b""
+    if table.min() < 0 or table.max() >= 2**32:
         return lines("".join(f"%d{end}" for end in ends), table)
     digits = [len(str(most)) for most in table.max(axis=0).tolist()]
     parts = (_digits(part, digits, [end.encode() for end in ends], b"\0") for part in _parts(table))

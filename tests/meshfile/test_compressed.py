@@ -102,8 +102,8 @@ def test_the_content_tells_and_then_the_name_before_the_last_dot(tmp_path: Path)
     run("untangle", "-q", plain, plain)
     assert plain.read_bytes().startswith(b"# vtk")
     text = tmp_path / "headless.msh.gz"
-    named(b"3 3 3\n0 0 1\n1 0 1\n0 1 1\n", text)
-    assert "is a file of FreeFEM" in error_line("quality", text)
+    named(b"ISO-10303-21;\nHEADER;\n", text)
+    assert "is a file of STEP" in error_line("quality", text)
 
 
 def test_a_conversion_is_compressed_by_its_name(tmp_path: Path) -> None:

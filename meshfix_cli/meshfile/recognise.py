@@ -273,12 +273,12 @@ _FREEFEM = re.compile(
 def freefem(data: bytes, text: str) -> Format | None:
     """Recognise the counts and the first vertices; where all of these are integers, also by the number of lines."""
     head = _FREEFEM.match(text)
-    if head is None or int(head[1]) < 3:
+    width = len(head[4].split()) // 2 if head else 0
+    if head is None or int(head[1]) < 3 or (width == 3 and int(head[3]) == 0):  # no boundary: one of Geomview
         return None
     if "." in head[4]:
         return Format("freefem")
     numbered = [line.split()[0] for line in head[4].split("\n" if "\n" in head[4] else "\r")[:2]]
-    width = len(head[4].split()) // 2
     elements = numbered in (["0", "1"], ["1", "2"]) and width == 1 + int(head[2]) + int(head[3])  # Triangle's
     breaks = max(data.count(b"\n"), data.count(b"\r"))
     return None if elements or breaks < sum(int(head[i]) for i in (1, 2, 3)) else Format("freefem")

@@ -148,12 +148,12 @@ def test_the_best_smoothing_comes_to_rest(mesh: Mesh) -> None:
     "wrong", [{"smooth": "bset"}, {"smooth": -1}, {"smooth": 2.5}, {"threshold": 100}, {"max_move": -1}]
 )
 def test_arguments_out_of_range_are_refused(plate: Mesh, wrong: dict[str, Any]) -> None:
-    with pytest.raises(ValueError, match="must be"):
+    with pytest.raises(ValueError, match=r"is neither|and not"):
         untangle(plate, **wrong)
 
 
 def test_a_strategy_that_there_is_not_is_refused_with_those_that_there_are(plate: Mesh) -> None:
-    with pytest.raises(ValueError, match=f"strategy is 'XX', and must be one of {', '.join(STRATEGIES)}"):
+    with pytest.raises(ValueError, match=f"strategy is one of {', '.join(STRATEGIES)}, and not 'XX'"):
         untangle(plate, strategy="XX")
 
 

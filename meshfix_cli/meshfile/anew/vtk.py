@@ -64,7 +64,7 @@ def _fields(arrays: Mapping[str, NDArray[Any]], old: bool, binary: bool) -> Iter
     if arrays:
         yield f"FIELD FieldData {len(arrays)}\n".encode()
     for name, array in arrays.items():
-        values = _narrow(array) if old else array
+        values = _narrow(array) if old else _wide(array)
         columns = 1 if values.ndim == 1 else values.shape[1]
         yield f"{_name(name)} {columns} {len(values)} {_TYPES[values.dtype.str[1:]]}\n".encode()
         yield _numbers(values, binary)
@@ -74,6 +74,11 @@ def _narrow(values: NDArray[Any]) -> NDArray[Any]:
     """Return integers in 32 bits where they fit: not all readers of old files have a word for 64."""
     small = np.dtype(f"{values.dtype.kind}4") if values.dtype.kind in "iu" and values.itemsize == 8 else values.dtype
     return values.astype(small) if (values.astype(small) == values).all() else values
+
+
+def _wide(values: NDArray[Any]) -> NDArray[Any]:
+    """Return integers of 32 bits in 64: some readers of new files take these for any integer."""
+    return values.astype(np.int64) if values.dtype == np.int32 else values
 
 
 def _numbers(values: NDArray[Any], binary: bool, last: bool = True) -> bytes:

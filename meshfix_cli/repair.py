@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from meshfix_cli.errors import RequirementError, WriteError, listed, together
+from meshfix_cli.errors import RequirementError, WriteError, listed, naming, together
 from meshfix_cli.mesh.elements import counted, words
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.solve import strategies
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from meshfix_cli.solve.records import Outcome, SweepRecord
     from meshfix_cli.solve.team import Team
 
-    Mask = NDArray[np.bool_]
     Steps = Iterator[tuple[Mesh, SweepRecord]]
 
 
@@ -73,7 +72,6 @@ class Held:
         ReadError, InvalidMeshError
             Also where the elements are others.
         """
-        from meshfix_cli.errors import naming
         from meshfix_cli.meshfile.displaced import places_in
 
         reference = replace(self, fix=(), regions=None, input_format=None).read(source, threads)
@@ -261,6 +259,15 @@ class Method:
             mesh, straight, floor=floor, relax=self.curving == "relax", max_move=reach, threads=threads,
             sweeps=self.sweeps,
         )  # fmt: skip
+
+
+def tangled(document: Document, percent: float, dist: Distance, seed: int, threads: int) -> tuple[Mesh, dict[str, Any]]:
+    """Tangle a mesh, see `perturb.perturb`; return it, and what a report tells of that."""
+    from meshfix_cli.solve.perturb import perturb
+
+    length = dist.length(document.mesh, threads)
+    mesh, moved = perturb(document.mesh, percent, length, seed)
+    return mesh, {"moved": moved, "distance": length, "percent": percent, "seed": seed}
 
 
 def as_surface(document: Document) -> Document:

@@ -8,7 +8,7 @@ import click
 
 from meshfix_cli.cli.files import open_files, report_stream
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, sliding, writing
-from meshfix_cli.repair import Files, Held, Method
+from meshfix_cli.repair import Files, Held, Method, tangled
 from meshfix_cli.solve.perturb import Distance
 
 
@@ -40,17 +40,13 @@ def perturb(
     With one seed, the same vertices move in the same directions whatever --percent and --dist are. Exits with 0
     whether or not elements are inverted.
     """
-    from meshfix_cli.solve.perturb import perturb as tangle
-
     draw.check()
     document, output = open_files(files, held, show.threads, *draw.names)
     if boundary and method.slide == "none":
         method = replace(method, slide="flat")
     document = method.freed(document)
-    length = dist.length(document.mesh, show.threads)
-    perturbed, moved = tangle(document.mesh, percent, length, seed)
+    perturbed, facts = tangled(document, percent, dist, seed, show.threads)
     result, notes = files.write(document, perturbed, output)
-    facts = {"moved": moved, "distance": length, "percent": percent, "seed": seed}
     stages = {"before": document.mesh, "perturbed": result}
     notes = (*method.without_effect(document.mesh), *notes)
     report = show.judge(draw).report("perturb", document, stages, notes, facts=facts)

@@ -26,6 +26,7 @@ from meshfix_cli.cli.options import (
     writing,
 )
 from meshfix_cli.cli.process import INVERTED, VALID, processes
+from meshfix_cli.errors import naming
 from meshfix_cli.repair import Files, Held, Method, repair
 
 if TYPE_CHECKING:
@@ -81,9 +82,7 @@ def untangle(
     vertices at once), and the paper's LS (Laplacian), US (linear programme), CS (both for each vertex), LUS (3
     Laplacian sweeps, then the programme).
     """
-    from meshfix_cli.errors import naming
     from meshfix_cli.meshfile.atomic import write_text
-    from meshfix_cli.meshfile.displaced import displaced, places_in
     from meshfix_cli.meshfile.writing import check_cells
     from meshfix_cli.report.as_json import history_csv
     from meshfix_cli.report.terminal import console, with_progress
@@ -103,14 +102,16 @@ def untangle(
         document, output = open_files(files, held, show.threads, history, cells, *draw.names)
         if cells is not None:
             check_cells(document, cells)
-        before = None
+        first, before = document, None
         if displace is not None:
-            first = document
-            with naming(document.name):
-                document = displaced(first, displace)
-                before = places_in(first, document, show.threads)
+            from meshfix_cli.meshfile.displaced import displaced, places_in
+
+            document = displaced(first, displace)
         if reference is not None:
             before = held.read_reference(reference, document, show.threads)
+        elif displace is not None:
+            with naming(first.name):
+                before = places_in(first, document, show.threads)
         alone = partial(method.solve, threads=show.threads, watch=watch)
         solve, put = (root.solve, root.put) if root else (alone, None)
         report = repair(document, output, files, method, show.judge(draw, requirements), solve, put, before)

@@ -18,7 +18,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
-from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, alike, check_blank, in_columns
+from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, alike, are_blank, check_blank, in_columns
 from meshfix_cli.meshfile.text import Spans, integers_at, unmarked
 
 _COUNTS = re.compile(rb"\s*(\d{1,18})\s+(\d{1,18})\s+(\d{1,18})\s+(\d{1,18})(?!\S)")
@@ -73,8 +73,7 @@ def _places(data: bytes, spans: Spans) -> Places:
     if columns is not None:
         widths = np.full(begin.shape, width)
         return Places(columns[..., 0], columns[..., 1], np.dtype("f8"), width - 1, "free", widths)
-    raw = np.frombuffer(data, dtype=np.uint8)
-    touching = ~np.isin(raw[begin - 1], list(b" \t\r\n,"))
+    touching = ~are_blank(data, begin - 1)
     if not touching.any():
         return Places.of_text(spans, "f8", 25, "free")
     longest = int((end - begin)[touching].min()) - 1

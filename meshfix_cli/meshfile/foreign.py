@@ -11,22 +11,19 @@ from meshfix_cli.meshfile.formats import HEAD
 from meshfix_cli.meshfile.recognise import Format
 
 MOST_BYTES = 65536  # of a data set that may be texts
-# How a file begins, and where its extension must help to tell.
+# How a file begins.
 _FOREIGN = (
-    ("STEP", r"ISO-10303-21;", ""),
-    ("OpenCASCADE", r"(?:DBRep_DrawableShape|CASCADE Topology V)", ""),
-    ("EnSight", r"(?:#[^\n]*\n\s*)*FORMAT\s*\n\s*type:\s*ensight", ""),
-    ("glTF", r"glTF", ""),
+    ("STEP", r"ISO-10303-21;"),
+    ("OpenCASCADE", r"(?:DBRep_DrawableShape|CASCADE Topology V)"),
+    ("EnSight", r"(?:#[^\n]*\n\s*)*FORMAT\s*\n\s*type:\s*ensight"),
+    ("glTF", r"glTF"),
 )
 
 
-def name_of(data: bytes, suffix: str) -> str | None:
+def name_of(data: bytes) -> str | None:
     """Return what a format is called that is not read, though its extension or its first words are those of another."""
     text = data[:HEAD].decode("latin-1").lstrip("\ufeff\xef\xbb\xbf \t\r\n").replace("\r", "\n")
-    for name, begin, extension in _FOREIGN:
-        if extension in ("", suffix) and re.match(begin, text):
-            return name
-    return None
+    return next((name for name, begin in _FOREIGN if re.match(begin, text)), None)
 
 
 def misread(data: bytes, form: Format) -> str | None:

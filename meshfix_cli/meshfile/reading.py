@@ -160,7 +160,7 @@ def _format(data: bytes, path: Path, name: str | None) -> Format | None:
     form = formats.sniff(data)
     if name is not None:
         return form if form is not None and form.reader == name else Format(name)
-    other = foreign.name_of(data, path.suffix.lower())
+    other = foreign.name_of(data)
     if other is not None:
         raise ReadError(f"is a file of {other}, which meshfix does not read")
     return form or formats.by_name(path)

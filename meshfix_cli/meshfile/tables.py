@@ -206,15 +206,15 @@ def right_aligned(text: bytes, spans: Spans) -> Places:
     """
     width = int(spans[0, 1, 1] - spans[0, 0, 1]) - 1 if spans.size else 0
     columns = in_columns(text, spans, width)
-    if columns is None or not _is_blank(text, columns[..., 0] - 1):
+    if columns is None or not are_blank(text, columns[..., 0] - 1).all():
         return Places.of_text(spans, "f8", 25, "free")
     return Places.of_text(columns, "f8", width, "padded")
 
 
-def _is_blank(text: bytes, at: Int64) -> bool:
-    """Whether no word stands at any of some offsets; before the text there is none."""
+def are_blank(text: bytes, at: Int64) -> NDArray[np.bool_]:
+    """Return at which offsets (...) no word stands; before the text there is none."""
     raw = np.frombuffer(text, dtype=np.uint8)
-    return bool(np.isin(raw[at[at >= 0]], list(b" \t\r\n,")).all())
+    return np.isin(raw[np.maximum(at, 0)], list(b" \t\r\n,")) | (at < 0)
 
 
 class Numbering:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
@@ -29,7 +28,7 @@ from meshfix_cli.objects.options import (
     method_of,
 )
 from meshfix_cli.quality.summary import Summary, summarise
-from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair
+from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair, tangled
 from meshfix_cli.report.sliding import sliding
 from meshfix_cli.solve.perturb import perturb as perturb_mesh
 from meshfix_cli.solve.records import Outcome, SweepRecord
@@ -192,12 +191,11 @@ def untangle(
         raise OptionError("a reference and only_invalid exclude each other")
     judge = judge_of(metrics, require, threads)
     document, kind = _document(mesh, held_of(fix, regions, join_points), threads)
-    moved, places, before = document, None, reference
-    with naming(document.name):
-        if displace is not None:
-            moved = displaced(document, displace)
-            before = document if reference is None else reference
-        if before is not None:
+    moved = document if displace is None else displaced(document, displace)
+    before = document if reference is None and displace is not None else reference
+    places = None
+    if before is not None:
+        with naming(document.name):
             places = places_in(_document(before, Held(join_points=join_points), threads)[0], moved, threads)
     report = repair(moved, moved.format, Files(dry_run=True), method, judge, reference=places)
     return Result(report, moved, mesh, kind)
@@ -250,10 +248,8 @@ def perturb(
         return perturb_mesh(mesh, percent, length.length(mesh, threads), seed)
     document, kind = _document(mesh, held_of(fix, regions, join_points), threads)
     document = method.freed(document)
-    step = length.length(document.mesh, threads)
-    tangled, moved = perturb_mesh(document.mesh, percent, step, seed)
-    stages = {"before": document.mesh, "perturbed": document.as_stored(tangled)}
-    facts = {"moved": moved, "distance": step, "percent": percent, "seed": seed}
+    moved, facts = tangled(document, percent, length, seed, threads)
+    stages = {"before": document.mesh, "perturbed": document.as_stored(moved)}
     return Result(Judge(threads=threads).report("perturb", document, stages, facts=facts), document, mesh, kind)
 
 
@@ -344,7 +340,7 @@ class Repairer:
 def _of_mesh(mesh: Mesh, method: Method, reference: Mesh | None, threads: int) -> Outcome:
     return untangle_mesh(
         mesh, method.strategy, sweeps=method.sweeps, smooth=method.smooth, threshold=method.threshold,
-        max_move=math.inf if method.max_move is None else method.max_move.length(mesh, threads),
+        max_move=method.reach(mesh, threads),
         only_invalid=method.only_invalid, reference=reference, threads=threads,
     )  # fmt: skip
 

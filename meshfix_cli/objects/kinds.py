@@ -11,21 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.meshfile.source import Arrays, Cells, Source, regions_among
-from meshfix_cli.meshfile.vtk.cells import TYPES, markings, runs
+from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, markings, runs, types_of_sizes
 
 # Elements that an array (m, k) names, by the coordinates of its points and by k.
 _OF_ARRAY = {
     (2, 3): "triangle", (2, 4): "quad", (3, 3): "triangle", (3, 4): "tetra", (3, 5): "pyramid", (3, 6): "wedge",
     (3, 8): "hexahedron",
 }  # fmt: skip
-# How polygons of VTK keep their cells, the types of these by the number of their vertices, and the type of others.
-_OF_POLYDATA: tuple[tuple[str, dict[int, int], int], ...] = (
-    ("Verts", {1: 1}, 2),
-    ("Lines", {2: 3}, 4),
-    ("Polys", {3: 5, 4: 9}, 7),
-    ("Strips", {}, 6),
-)
+_POLYDATA = dict(zip(("Verts", "Lines", "Polys", "Strips"), POLYDATA.values(), strict=True))
 _GHOSTS_DAMAGED = "its cell data {} cannot be read, and tell which cells are held"
 
 
@@ -137,7 +131,7 @@ def _of_vtk(grid: Any) -> Source:
     regions, cells = markings(arrays.cell.keys(), [run.cells for run in found], lambda: arrays.cell, _GHOSTS_DAMAGED)
     return Source(
         points if points.dtype.kind == "f" else points.astype("f8"), cells, load=lambda: arrays,
-        regions=regions_among(regions),
+        regions=regions,
     )  # fmt: skip
 
 
@@ -165,15 +159,13 @@ def _cell_array(cells: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 def _cells_of_polygons(grid: Any) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[Any]]:
     """Return the same of vertices, lines, polygons and strips, in which order VTK numbers them."""
     types, sizes, vertices = [np.empty(0, dtype=np.int64)], [np.zeros(1, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
-    for name, known, other in _OF_POLYDATA:
+    for name, of_sizes in _POLYDATA.items():
         cells = getattr(grid, f"Get{name}")()
         if cells is None or not cells.GetNumberOfCells():
             continue
         offsets, connectivity = _cell_array(cells)
         sizes.append(np.diff(offsets))
-        types.append(np.full(len(sizes[-1]), other))
-        for size, number in known.items():
-            types[-1][sizes[-1] == size] = number
+        types.append(types_of_sizes(sizes[-1], *of_sizes))
         vertices.append(connectivity)
     return np.concatenate(types), np.cumsum(np.concatenate(sizes)), np.concatenate(vertices)
 

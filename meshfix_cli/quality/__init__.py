@@ -1,4 +1,4 @@
-"""How good a mesh is, and what makes a valid one impossible."""
+"""How good a mesh is, and what keeps it from being better."""
 
 import sys
 from importlib import import_module

@@ -30,6 +30,14 @@ struct CellsOfFaces {
     std::vector<Index> nodes;          // `width` of each cell
 };
 
+// Which it is has no order that a processor could foresee, and so all are looked at.
+template <int COUNT, class Index>
+bool among(const Index* nodes, Index vertex) {
+    bool found = false;
+    for (int i = 0; i < COUNT; ++i) found |= nodes[i] == vertex;
+    return found;
+}
+
 // The loops of a cell's faces, seen from outside.
 template <class Index>
 class CellLoops {
@@ -67,14 +75,6 @@ class CellLoops {
         for (int i = 1; i < SIZE; ++i) nodes[i] = loops_[base][SIZE - i];
     }
 
-    // Of which it is has no order that a processor could foresee, and so all are looked at.
-    template <int COUNT>
-    static bool among(const Index* nodes, Index vertex) {
-        bool found = false;
-        for (int i = 0; i < COUNT; ++i) found |= nodes[i] == vertex;
-        return found;
-    }
-
     // Whether these nodes differ, and the faces have no others.
     template <int COUNT>
     bool has_all(const Index* nodes) const {
@@ -110,7 +110,7 @@ class CellLoops {
                 nodes[SIZE + under] = above;
             }
         }
-        return !among<SIZE>(nodes + SIZE, -1) && has_all<2 * SIZE>(nodes) ? 2 * SIZE : 0;
+        return !among<SIZE>(nodes + SIZE, Index{-1}) && has_all<2 * SIZE>(nodes) ? 2 * SIZE : 0;
     }
 };
 
@@ -132,18 +132,11 @@ class Tetrahedra {
             return mine[0] != mine[1] && mine[1] != mine[2] && mine[2] != mine[0];
         }
         for (int i = 0; i < 3; ++i) {
-            if (among(mine, 3, loop[i])) continue;
+            if (among<3>(mine, loop[i])) continue;
             if (mine[3] < 0) mine[3] = loop[i];
             if (mine[3] != loop[i]) return false;
         }
         return before < 4 && mine[3] >= 0;
-    }
-
-  private:
-    static bool among(const Index* nodes, int count, Index vertex) {
-        bool found = false;
-        for (int i = 0; i < count; ++i) found |= nodes[i] == vertex;
-        return found;
     }
 };
 

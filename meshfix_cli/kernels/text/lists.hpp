@@ -66,20 +66,17 @@ IntegerLists<T> read_integer_lists(std::string_view text, std::int64_t at, std::
         return read_digits<true>(text, at, value);
     };
     for (lists.end = at; count > 0; --count, lists.end = at) {
-        std::int64_t size = 0, value = 0;
-        if (read_short_list(text, at, lists.values)) {
-            lists.offsets.push_back(static_cast<T>(lists.values.size()));
-            lists.fit &= static_cast<std::size_t>(lists.offsets.back()) == lists.values.size();
-            continue;
+        if (!read_short_list(text, at, lists.values)) {
+            std::int64_t size = 0, value = 0;
+            lists.good = read(size) && passes(text, at, '(');
+            for (std::int64_t i = 0; lists.good && i < size; ++i) {
+                lists.good = read(value);
+                lists.values.push_back(static_cast<T>(value));
+                lists.fit &= lists.values.back() == value;
+            }
+            lists.good = lists.good && passes(text, at, ')');
+            if (!lists.good) return lists;
         }
-        lists.good = read(size) && passes(text, at, '(');
-        for (std::int64_t i = 0; lists.good && i < size; ++i) {
-            lists.good = read(value);
-            lists.values.push_back(static_cast<T>(value));
-            lists.fit &= lists.values.back() == value;
-        }
-        lists.good = lists.good && passes(text, at, ')');
-        if (!lists.good) return lists;
         lists.offsets.push_back(static_cast<T>(lists.values.size()));
         lists.fit &= static_cast<std::size_t>(lists.offsets.back()) == lists.values.size();
     }

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.anew.content import Content
-from meshfix_cli.meshfile.anew.tables import form_of, lines
+from meshfix_cli.meshfile.anew.tables import integers, lines
+from meshfix_cli.meshfile.medit.sections import CELLS
 from meshfix_cli.meshfile.recognise import Format
 
-_SECTIONS = {
-    "line": "Edges", "triangle": "Triangles", "quad": "Quadrilaterals", "tetra": "Tetrahedra",
-    "hexahedron": "Hexahedra", "wedge": "Prisms", "pyramid": "Pyramids", "line3": "EdgesP2", "triangle6": "TrianglesP2",
-    "quad9": "QuadrilateralsQ2", "tetra10": "TetrahedraP2",
-}  # fmt: skip
+# Of types that have several names, the first; of those that are only held there is no order of nodes.
+_SECTIONS = {key: name for name, (key, _) in reversed(CELLS.items()) if key in ELEMENTS}
 
 
 def written(content: Content, _: Format) -> bytes:
@@ -23,11 +22,11 @@ def written(content: Content, _: Format) -> bytes:
     points = np.asarray(content.points, dtype=np.float64)
     n, dimension = points.shape
     parts = [f"MeshVersionFormatted 2\nDimension {dimension}\n\nVertices\n{n}\n".encode()]
-    parts.append(lines(form_of(dimension, 1), points, np.zeros(n, dtype=np.int64)))
+    parts.append(lines("%r " * dimension + "0\n", points))
     for i, run in enumerate(content.cells):
         m = len(run.vertices)
         if run.type in _SECTIONS and m:
             labels = np.zeros(m, dtype=np.int64) if content.regions is None else content.regions[i]
             parts.append(f"\n{_SECTIONS[run.type]}\n{m}\n".encode())
-            parts.append(lines(form_of(0, run.vertices.shape[1] + 1), run.vertices + 1, labels))
+            parts.append(integers(run.vertices + 1, labels))
     return b"".join([*parts, b"\nEnd\n"])

@@ -105,11 +105,6 @@ def numbered(numbers: NDArray[Any], values: NDArray[np.float64], between: str = 
     return b"".join([number + between.encode() + row for number, row in rows])
 
 
-def form_of(reals: int, integers: int) -> str:
-    """Return the form of a line of so many reals, and of integers behind them, with blanks between."""
-    return " ".join(["%r"] * reals + ["%d"] * integers) + "\n"
-
-
 def rows_of(values: NDArray[Any], width: int = 12) -> bytes:
     """Return the rows of a table (n, k) in lines; numbers (n,) with so many in each."""
     write = reals if values.dtype.kind == "f" else integers

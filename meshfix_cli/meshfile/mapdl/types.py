@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.mesh.elements import ELEMENTS, straight_key
 from meshfix_cli.meshfile.tables import Int64
 
 _MESH_ONLY = 200  # whose first option tells what it is
@@ -55,11 +56,7 @@ _REPEATED: dict[str, Sequence[tuple[str, Sequence[tuple[int, int]], Sequence[int
     "quad8": (("triangle6", ((2, 3),), (0, 1, 2, 4, 5, 7)),),
     "quad": (("triangle", ((2, 3),), (0, 1, 2)),),
 }
-_CORNERS = {"tetra10": 4, "pyramid13": 5, "wedge15": 6, "hexahedron20": 8, "triangle6": 3, "quad8": 4}
-_LINEAR = {
-    "tetra10": "tetra", "pyramid13": "pyramid", "wedge15": "wedge", "hexahedron20": "hexahedron",
-    "triangle6": "triangle", "quad8": "quad",
-}  # fmt: skip
+_SECOND = ("tetra10", "pyramid13", "wedge15", "hexahedron20", "triangle6", "quad8")  # that may have corners alone
 
 
 class Some(NamedTuple):
@@ -96,12 +93,13 @@ def _key(number: int, option: int, size: int) -> str:
 
 def _of_any_order(key: str, columns: Sequence[int], rows: Int64, nodes: Int64) -> Iterator[Some]:
     """Give elements that have all their nodes, those of second order that have their corners alone, and the others."""
-    if key not in _LINEAR:
+    linear = straight_key(key) if key in _SECOND else None
+    if linear is None:
         yield from _whole(key, columns, rows, nodes)
         return
-    corners = _CORNERS[key]
+    corners = ELEMENTS[linear].nodes
     straight = (nodes[rows][:, columns[corners:]] == 0).all(axis=1)
-    yield from _whole(_LINEAR[key], columns[:corners], rows[straight], nodes)
+    yield from _whole(linear, columns[:corners], rows[straight], nodes)
     yield from _whole(key, columns, rows[~straight], nodes)
 
 

@@ -53,6 +53,7 @@ def parse(data: bytes) -> Source:
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners),
         partial(_arrays, runs, sets, nodes), held=held if held.any() else None,
         notes=("depths stay with their nodes, also where these move",),
+        numbers=lambda: points.numbers,
     )  # fmt: skip
 
 

@@ -72,7 +72,8 @@ def parse(data: bytes) -> Source:
         runs.add(ordered, partial(_corners, cells, chosen, order), {_MATERIAL: cells.integers(1, 2, chosen)[:, 0]})
     layout = InPlace(data, coordinates, runs.corners)
     untold = ("comments",) * (text is not data) + ("data of points and cells",) * any(counts[2:])
-    return Source(place, runs.cells, layout, runs.arrays, (_MATERIAL,), untold=untold)
+    numbers = points.numbers
+    return Source(place, runs.cells, layout, runs.arrays, (_MATERIAL,), untold=untold, numbers=lambda: numbers)
 
 
 def _counts(text: bytes) -> tuple[list[int], int]:

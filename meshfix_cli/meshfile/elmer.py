@@ -95,7 +95,7 @@ def _source(nodes: bytes, elements: bytes, beside: Mapping[str, bytes]) -> tuple
     elif counts[2]:
         raise ReadError("has elements of the boundary in a .boundary, which is not there")
     layout = InPlace(nodes + elements, coordinates, runs.corners)
-    return Source(place, runs.cells, None, runs.arrays, (_BODY,)), layout
+    return Source(place, runs.cells, None, runs.arrays, (_BODY,), numbers=lambda: numbering.numbers), layout
 
 
 def _table(data: bytes, count: int) -> IntegerLines:

@@ -99,6 +99,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners),
         partial(runs.arrays, point_sets), (_MATERIAL,) * bool(elements), untold=("the model",),
+        numbers=lambda: points.numbers,
     )  # fmt: skip
 
 

@@ -100,6 +100,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(data), runs.cells, InPlace(data, coordinates, runs.corners), partial(runs.arrays, point_sets),
         (_REF,) * bool(groups and elements), untold=tuple(f"section {name}" for name in others),
+        numbers=lambda: points.numbers,
     )  # fmt: skip
 
 

@@ -74,6 +74,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners), runs.arrays,
         untold=("comments",) * (text is not data) + tuple(unread), oriented=False,
+        numbers=lambda: ids,
     )  # fmt: skip
 
 

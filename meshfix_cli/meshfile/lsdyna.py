@@ -108,7 +108,7 @@ def parse(data: bytes) -> Source:
     notes = ("it includes other files, which are left where they are",) if including else ()
     return Source(
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners), lambda: arrays,
-        (_PART,) * bool(parts), held, untold, notes,
+        (_PART,) * bool(parts), held, untold, notes, lambda: numbers,
     )  # fmt: skip
 
 

@@ -84,6 +84,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(text), runs.cells, InPlace(data, coordinates, runs.corners), partial(runs.arrays, points),
         (_PROPERTIES,) if numbers["Elements"].ids or numbers["Conditions"].ids else (), untold=untold,
+        numbers=lambda: nodes.numbers,
     )  # fmt: skip
 
 

@@ -82,7 +82,10 @@ def parse(data: bytes) -> Source:
         fields = [field for field, kinds in _fields(root, name).items() if any(kind != "NOE" for kind in kinds)]
         tags = [CELLS] if _with_families(root, runs) else []
         regions = regions_among([*tags, *fields])
-        return Source(points.read(root), cells, layout, load, regions, untold=_untold(root, name))
+        given = hdf5.data_set(nodes, "NUM")
+        numbers = None if given is None else _per(given, len(points.at))
+        untold = _untold(root, name)
+        return Source(points.read(root), cells, layout, load, regions, untold=untold, numbers=lambda: numbers)
 
 
 def _mesh(root: Any) -> tuple[str, Any]:

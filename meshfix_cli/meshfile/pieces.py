@@ -119,6 +119,7 @@ def join(family: Family, sources: Sequence[Source], threads: int = 1) -> Source:
         held=_held(sources, by_piece, cells, len(chosen)),
         untold=_distinct(source.untold for source in sources),
         notes=(note, *_distinct(source.notes for source in sources)),
+        numbers=lambda: None if numbers is None else numbers[chosen],
         pieces=Joined(family, sources, by_piece, origins),
     )
 

@@ -23,6 +23,7 @@ REGIONS = (
     "nastran:ref", "avsucd:material", "exodus:block", "flac3d:group", "netgen:index", "tetgen:ref", "ugrid:ref",
     "MaterialIDs", "CellEntityIds", "RegionId",
 )  # fmt: skip
+NO_NUMBER = -1
 # What is left of their names in small letters, without "id", "ids" and what is no letter.
 _LIKE = frozenset({
     "material", "materials", "mat", "region", "regions", "cellentity", "part", "block", "elementblock", "subdomain",
@@ -49,7 +50,7 @@ class Cells:
     vertices : (m, k) int
         Rows of the points; a list of arrays where the cells have different numbers of vertices.
     ids : (m,) int64 or None
-        The numbers that the file gives to them.
+        The numbers that the file gives to them; NO_NUMBER for those among cells of a type that have none.
     ghosts : (m,) bool or None
         Cells that another piece of the mesh has as well.
     """
@@ -233,12 +234,8 @@ class Source:
 
     def merged(self) -> Source:
         """Return the same with one run for all cells of a type: some programs read no more than one of each."""
-        alike: dict[tuple[str, int], list[int]] = {}
-        for i, run in enumerate(self.cells):
-            width = run.vertices.shape[1] if isinstance(run.vertices, np.ndarray) else -1 - i
-            alike.setdefault((run.type, width), []).append(i)
-        groups, mine = list(alike.values()), self.arrays
-        cells = [Cells(kind, _joined([self.cells[i].vertices for i in runs])) for (kind, _), runs in alike.items()]
+        groups, mine = self._alike(), self.arrays
+        cells = [_as_one([self.cells[i] for i in runs]) for runs in groups]
         cell = {name: [_joined([values[i] for i in runs]) for runs in groups] for name, values in mine.cell.items()}
         sets = {}
         for name, rows in mine.cell_sets.items():
@@ -247,20 +244,22 @@ class Source:
         arrays = replace(mine, cell=cell, cell_sets=sets)
         return replace(self, cells=cells, load=lambda: arrays)
 
-    def in_order(self) -> Source:
-        """Return the same with one run for all cells of a type, ordered by their numbers; itself if they stand so."""
-        runs: dict[tuple[str, int], list[NDArray[np.int64]]] = {}
-        for run in self.cells:
-            if run.ids is None or not isinstance(run.vertices, np.ndarray):
-                return self
-            runs.setdefault((run.type, run.vertices.shape[1]), []).append(run.ids)
-        orders = [np.argsort(np.concatenate(ids), kind="stable") for ids in runs.values()]
+    def in_order(self, numbered: Source | None = None) -> Source:
+        """Return the same with one run for all cells of a type, ordered by their numbers; itself if they stand so.
+
+        Parameters
+        ----------
+        numbered : Source, optional
+            One of the same cells that gives the numbers; default: itself.
+        """
+        ids = [run.ids for run in (numbered or self).cells]
+        orders = [self._order(runs, [ids[i] for i in runs]) for runs in self._alike()]
         if all((order[1:] > order[:-1]).all() for order in orders):
             return self
         whole = self.merged()
         mine = whole.arrays
         pairs = list(enumerate(orders))
-        cells = [replace(whole.cells[i], vertices=whole.cells[i].vertices[order]) for i, order in pairs]
+        cells = [_in(order, whole.cells[i]) for i, order in pairs]
         cell = {name: [values[i][order] for i, order in pairs] for name, values in mine.cell.items()}
         sets = {
             name: [np.flatnonzero(np.isin(order, rows[i])) for i, order in pairs]
@@ -268,6 +267,21 @@ class Source:
         }
         arrays = replace(mine, cell=cell, cell_sets=sets)
         return replace(whole, cells=cells, load=lambda: arrays)
+
+    def _alike(self) -> list[list[int]]:
+        """Return which runs have cells of one type and as many vertices."""
+        alike: dict[tuple[str, int], list[int]] = {}
+        for i, run in enumerate(self.cells):
+            width = run.vertices.shape[1] if isinstance(run.vertices, np.ndarray) else -1 - i
+            alike.setdefault((run.type, width), []).append(i)
+        return list(alike.values())
+
+    def _order(self, runs: Sequence[int], ids: Sequence[NDArray[np.int64] | None]) -> NDArray[np.int64]:
+        """Return the order of the cells of some runs, that of the file where one of these has no numbers."""
+        numbers = [mine for mine in ids if mine is not None]
+        if len(numbers) < len(runs) or not isinstance(self.cells[runs[0]].vertices, np.ndarray):
+            return np.arange(sum(len(self.cells[i].vertices) for i in runs))
+        return np.argsort(_joined(numbers), kind="stable")
 
     def _starts(self, runs: Sequence[int]) -> list[int]:
         """How many cells stand before each of some runs when these are joined."""
@@ -302,6 +316,19 @@ def ghost_vertices(cells: Sequence[Cells], n: int) -> NDArray[np.bool_] | None:
         vertices = run.vertices[run.ghosts] if run.ghosts is not None else np.empty(0, dtype=np.int64)
         mask[vertices[(vertices >= 0) & (vertices < n)]] = True
     return mask
+
+
+def _as_one(runs: Sequence[Cells]) -> Cells:
+    """Return the cells of runs of one type, with their numbers if any has some."""
+    numbers = [np.full(len(run.vertices), NO_NUMBER) if run.ids is None else run.ids for run in runs]
+    there = any(run.ids is not None for run in runs)
+    return Cells(runs[0].type, _joined([run.vertices for run in runs]), _joined(numbers) if there else None)
+
+
+def _in(order: NDArray[np.int64], run: Cells) -> Cells:
+    """Return cells in another order."""
+    vertices = run.vertices[order] if isinstance(run.vertices, np.ndarray) else run.vertices
+    return Cells(run.type, vertices, None if run.ids is None else run.ids[order])
 
 
 def _joined(parts: Sequence[Any]) -> Any:

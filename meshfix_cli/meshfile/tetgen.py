@@ -95,7 +95,9 @@ def _source(nodes: bytes, elements: bytes, facets: Mapping[str, bytes]) -> tuple
             _add_facets(runs, data, *_FACETS[suffix], numbering, kind == "tetra10")
     layout = InPlace(nodes + elements, coordinates, runs.corners)
     untold = ("comments",) if b"#" in nodes or b"#" in elements else ()
-    return Source(points, runs.cells, None, runs.arrays, (_REF,) * bool(labels), untold=untold), layout
+    regions = (_REF,) * bool(labels)
+    source = Source(points, runs.cells, None, runs.arrays, regions, untold=untold, numbers=lambda: numbering.numbers)
+    return source, layout
 
 
 def _head(data: bytes, counts: int) -> tuple[bytes, int, list[int]]:

@@ -80,6 +80,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(data), runs.cells, InPlace(data, coordinates, runs.corners),
         partial(_arrays, runs, names, points), regions, untold=(f"data sets {others}",) * bool(others),
+        numbers=lambda: points.numbers,
     )  # fmt: skip
 
 

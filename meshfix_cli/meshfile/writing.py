@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.mesh.elements import dimension_of, words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile import anew, compressed, foreign, formats
+from meshfix_cli.meshfile import anew, compressed, foreign, formats, numbering
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import PARTS
@@ -280,7 +280,10 @@ def _write_anew(
         The format cannot hold the elements that are solved for, or rounds them too much.
     """
     if form.name in anew.WRITERS:
-        path.write_bytes(anew.written(source, points, form))
+        prepared = anew.prepared(source, form)
+        path.write_bytes(anew.written(prepared, points, form))
+        if prepared is not source:  # its cells have numbers there, by which they are found
+            source = source.in_order(prepared)
     else:
         from meshfix_cli.meshfile import through_meshio
 
@@ -298,7 +301,7 @@ def _write_anew(
             raise WriteError(f"cannot be written as {form.name}: that holds no {words(lacking.type)[1]}{where}")
         corners = _spatial(back.points)[np.concatenate([rows.ravel() for rows in found])]
         difference = np.abs(corners - _spatial(held)[expected]).max()
-        dropped = source.lost_in(back)
+        dropped = (*source.lost_in(back), *numbering.lost(source, back))
         if back.arrays.unread:
             raise WriteError(f"cannot be written as {form.name}: it would hold {back.arrays.unread[0]}")
     except WriteError:

@@ -50,7 +50,7 @@ def test_all_arrives(kind: str, name: str, tmp_path: Path) -> None:
 def test_the_library_of_netcdf_finds_blocks_and_sets(tmp_path: Path) -> None:
     netcdf = pytest.importorskip("netCDF4")
     source = laden()
-    (tmp_path / "out.e").write_bytes(anew.written(source, source.points, EXODUS))
+    (tmp_path / "out.e").write_bytes(anew.written(anew.prepared(source, EXODUS), source.points, EXODUS))
     groups = groups_of(source)
     with netcdf.Dataset(tmp_path / "out.e") as file:
         named = titles(file["eb_names"][:])
@@ -70,7 +70,7 @@ def test_the_library_of_netcdf_finds_blocks_and_sets(tmp_path: Path) -> None:
 
 def test_meshio_reads_the_same(tmp_path: Path) -> None:
     source = laden()
-    (tmp_path / "out.e").write_bytes(anew.written(source, source.points, EXODUS))
+    (tmp_path / "out.e").write_bytes(anew.written(anew.prepared(source, EXODUS), source.points, EXODUS))
     mesh = meshio.read(tmp_path / "out.e")
     np.testing.assert_array_equal(mesh.points, source.points)
     for run in source.cells:
@@ -83,7 +83,7 @@ def test_sides_are_those_of_the_facets(tmp_path: Path) -> None:
     """Whatever the element, and of either order: the reader finds the nodes of each."""
     for kind, name in (("linear", "every solid"), ("serendipity", "every solid")):
         source = laden(kind, name)
-        back = parse(anew.written(source, source.points, EXODUS), EXODUS)
+        back = parse(anew.written(anew.prepared(source, EXODUS), source.points, EXODUS), EXODUS)
         wall = groups_of(source)["hot_wall"].points
         found = [rows for one, rows in back.arrays.point_sets.items() if one.endswith("_sides")]
         np.testing.assert_array_equal(np.unique(np.concatenate(found)), wall)
@@ -99,7 +99,7 @@ def test_blocks_alone_tell_materials_that_have_one_type(tmp_path: Path) -> None:
     points = np.random.default_rng(0).random((5, 3))
     tets = np.array([[0, 1, 2, 3], [1, 2, 3, 4], [0, 2, 3, 4]])
     source = Source(points, [Cells("tetra", tets)], load=lambda: arrays, regions=("ref",))
-    back = parse(anew.written(source, points, EXODUS), EXODUS)
+    back = parse(anew.written(anew.prepared(source, EXODUS), points, EXODUS), EXODUS)
     assert back.regions == ("exodus:block",)
     assert [run.ids.tolist() for run in back.cells if run.ids is not None] == [[1, 3], [2]]
     assert [values.tolist() for values in back.arrays.cell["exodus:block"]] == [[4, 4], [9]]

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from laden import document_of, laden
+from laden import document_of, elements_of, laden, nodes_of, places, with_numbers
 
 from meshfix_cli import read, write
 from meshfix_cli.meshfile.groups import groups_of
@@ -20,7 +20,7 @@ from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Source
 
 CELLS, POINTS, POINT_DATA, CELL_DATA = "sets of cells", "sets of points", "point data", "cell data"
-REGIONS, NAMES, FACETS = "regions", "names of regions", "facets"
+REGIONS, NAMES, FACETS, NUMBERS = "regions", "names of regions", "facets", "numbers of nodes and elements"
 ALL = frozenset({REGIONS, NAMES, FACETS, CELLS, POINTS, POINT_DATA, CELL_DATA})
 GROUPS = {"steel": NAMES, "copper": NAMES, "hot_wall": FACETS, "probe": CELLS, "clamped": POINTS}
 
@@ -38,13 +38,13 @@ FORMATS = {
     "vtu": Held(Format("vtu", True), ".vtu"),
     "vtk": Held(Format("vtk", False), ".vtk"),
     "xdmf": Held(Format("xdmf"), ".xdmf"),
-    "exodus": Held(Format("exodus"), ".e"),
-    "gmsh22": Held(Format("gmsh22", False), ".msh", ALL - {CELLS, POINTS}),
-    "gmsh": Held(Format("gmsh", True), ".msh", ALL - {POINTS}),
-    "abaqus": Held(Format("abaqus"), ".inp", ALL - {POINT_DATA, CELL_DATA}),
+    "exodus": Held(Format("exodus"), ".e", ALL | {NUMBERS}),
+    "gmsh22": Held(Format("gmsh22", False), ".msh", (ALL | {NUMBERS}) - {CELLS, POINTS}),
+    "gmsh": Held(Format("gmsh", True), ".msh", (ALL | {NUMBERS}) - {POINTS}),
+    "abaqus": Held(Format("abaqus"), ".inp", (ALL | {NUMBERS}) - {POINT_DATA, CELL_DATA}),
     "medit": Held(Format("medit"), ".mesh", frozenset({REGIONS})),
     "su2": Held(Format("su2"), ".su2", frozenset({FACETS})),
-    "nastran": Held(Format("nastran"), ".bdf", frozenset({REGIONS})),
+    "nastran": Held(Format("nastran"), ".bdf", frozenset({REGIONS, NUMBERS})),
 }
 
 
@@ -53,14 +53,9 @@ def made(name: str) -> bytes:
     """A laden mesh in a format."""
     held = FORMATS[name]
     with TemporaryDirectory() as folder:
-        document = document_of(laden())
+        document = document_of(with_numbers(laden()))
         write(document, document.mesh, Path(folder) / f"in{held.suffix}", held.form)
         return (Path(folder) / f"in{held.suffix}").read_bytes()
-
-
-def places(source: Source) -> list[tuple[float, ...]]:
-    rounded = np.asarray(source.points, dtype=np.float64).round(5) + 0.0
-    return list(map(tuple, rounded.tolist()))
 
 
 def solids(source: Source) -> set[tuple[Any, ...]]:
@@ -114,6 +109,13 @@ def test_what_both_hold_arrives(one: str, other: str, tmp_path: Path) -> None:
             assert points_of(after, name) == points_of(before, name)
         else:
             assert name in found or f"group {name}" in dropped
+    before = before.in_order() if NUMBERS in first.what & second.what else before
+    nodes, elements = nodes_of(after), elements_of(after)
+    if NUMBERS in first.what & second.what:
+        assert nodes == nodes_of(before)
+        assert elements.items() <= elements_of(before).items() and len(elements) == len(solids(after))
+    assert ("numbers of nodes" in dropped) == (NUMBERS in first.what - second.what)
+    assert ("numbers of elements" in dropped) == (NUMBERS in first.what - second.what)
     data = {f"point data {name}": values for name, values in before.arrays.point.items()}
     data |= {f"cell data {name}": np.concatenate(runs) for name, runs in before.arrays.cell.items()}
     in_order = after.in_order().merged()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -82,4 +83,33 @@ def members(source: Source) -> dict[str, tuple[set[Any], set[Any]]]:
             for row in run.vertices[rows].tolist()
         }
         found[name] = ({places[i] for i in group.nodes.tolist()}, cells)
+    return found
+
+
+def with_numbers(source: Source) -> Source:
+    """Give numbers to nodes and elements that tell more than their order does."""
+    rng = np.random.default_rng(0)
+    nodes, count = 7 * rng.permutation(len(source.points)) + 10**6, sum(len(run.vertices) for run in source.cells)
+    ids = np.split(3 * rng.permutation(count) + 11, np.cumsum([len(run.vertices) for run in source.cells])[:-1])
+    cells = [replace(run, ids=mine) for run, mine in zip(source.cells, ids, strict=True)]
+    return replace(source, cells=cells, numbers=lambda: nodes)
+
+
+def places(source: Source) -> list[tuple[float, ...]]:
+    rounded = np.asarray(source.points, dtype=np.float64).round(5) + 0.0
+    return list(map(tuple, rounded.tolist()))
+
+
+def nodes_of(source: Source) -> dict[tuple[float, ...], int]:
+    """The numbers of nodes by their places."""
+    numbers = source.numbers()
+    return {} if numbers is None else dict(zip(places(source), numbers.tolist(), strict=True))
+
+
+def elements_of(source: Source) -> dict[tuple[Any, ...], int]:
+    """The numbers of elements by their corners."""
+    at, found = places(source), dict[tuple[Any, ...], int]()
+    for run in source.cells:
+        for row, number in zip(run.vertices.tolist(), [] if run.ids is None else run.ids.tolist(), strict=False):
+            found[(run.type, *sorted(at[i] for i in row))] = number
     return found

@@ -44,7 +44,7 @@ def parse(data: bytes, path: Path | None = None) -> Source:
 
 def _parsed(data: bytes) -> Source:
     deck = read_deck(data)
-    coordinates, nodes = _nodes(deck)
+    coordinates, numbers, nodes = _nodes(deck)
     blocks = [*deck.of("ELEMENT")]
     cells = [_cells(deck, block, nodes) for block in blocks]
     layout = InPlace(data, coordinates, [partial(_corners, deck, block) for block in blocks])
@@ -61,13 +61,15 @@ def _parsed(data: bytes) -> Source:
         "instances are not moved to their places in the assembly: coordinates are those of the parts",
     ) * deck.placed + ("its last line does not end, as if the file had been cut there",) * deck.open_end
     notes += ("its steps include other files, which are left where they are",) * deck.included_by_steps
-    untold = ("numbers of nodes and elements", *deck.untold())
+    untold = deck.untold()
     apart = sum(1 for _ in deck.of("PART")) > 1
-    return Source(points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes, apart=apart)
+    return Source(
+        points, cells, layout, load, (SECTION,) * bool(sections), None, untold, notes, lambda: numbers, apart=apart
+    )
 
 
-def _nodes(deck: Deck) -> tuple[Places, Labels]:
-    """Find the coordinates (n, 2 or 3) of all nodes, and their numbers."""
+def _nodes(deck: Deck) -> tuple[Places, NDArray[np.int64], Labels]:
+    """Find the coordinates (n, 2 or 3) of all nodes, and their numbers (n,), also those of each part."""
     spans, numbers = [], {}
     for block in deck.of("NODE"):
         if block.parameters.get("SYSTEM", "R").upper() != "R":
@@ -83,7 +85,8 @@ def _nodes(deck: Deck) -> tuple[Places, Labels]:
     labels = Labels(numbers)
     if (number := labels.twice()) is not None:
         raise ReadError(f"is not a readable Abaqus file: the node {number} is defined twice")
-    return Places.of_text(_same_length(deck.text, np.concatenate(spans)), longest=_LONGEST), labels
+    places = Places.of_text(_same_length(deck.text, np.concatenate(spans)), longest=_LONGEST)
+    return places, np.concatenate([*numbers.values()]), labels
 
 
 def _same_length(text: bytes, spans: Spans) -> Spans:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +17,8 @@ from meshfix_cli.meshfile.anew.tables import integers, numbered
 from meshfix_cli.meshfile.recognise import Format
 
 _SHELLS = {"triangle": "S3", "quad": "S4", "triangle6": "STRI65", "quad8": "S8R", "quad9": "S9R5"}
+HELD = ("line", *_SHELLS, *SOLIDS.values())
+MOST = 999_999_999
 _ON_LINE, _LONGEST = 16, 20  # numbers, and characters of a number
 Sets = dict[str, list[Int64]]
 
@@ -25,15 +26,13 @@ Sets = dict[str, list[Int64]]
 def written(content: Content, _: Format) -> bytes:
     """Return a file; elements of the highest dimension have a section, which tells their material."""
     types = _types(content)
-    ends = np.cumsum([0, *(len(run.vertices) * (run.type in types) for run in content.cells)]).tolist()
-    ids = [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
     points = np.asarray(content.points, dtype=np.float64)
-    parts = [b"*HEADING\nMesh\n*NODE\n", numbered(np.arange(1, len(points) + 1), points, ",", _LONGEST)]
-    for run, mine in zip(content.cells, ids, strict=True):
-        if len(mine):
+    parts = [b"*HEADING\nMesh\n*NODE\n", numbered(content.nodes, points, ",", _LONGEST)]
+    for run, mine in zip(content.cells, content.elements, strict=True):
+        if run.type in HELD and len(mine):
             parts.append(f"*ELEMENT, TYPE={types[run.type]}\n".encode())
-            parts.append(integers(mine, run.vertices + 1, between=", ", longest=_ON_LINE))
-    materials, elements, nodes = _sets(content, ids)
+            parts.append(integers(mine, content.nodes_of(run.vertices), between=", ", longest=_ON_LINE))
+    materials, elements, nodes = _sets(content)
     words = _words([*dict.fromkeys([*materials, *elements, *nodes])])
     parts += [_set("ELSET", words[name], numbers) for name, numbers in (materials | elements).items()]
     parts += [_set("NSET", words[name], numbers) for name, numbers in nodes.items()]
@@ -53,28 +52,29 @@ def _types(content: Content) -> dict[str, str]:
     return {"line": "T3D2", **_SHELLS, **faces, **{key: f"C3D{nodes}" for nodes, key in SOLIDS.items()}}
 
 
-def _sets(content: Content, ids: Sequence[Int64]) -> tuple[Sets, Sets, Sets]:
+def _sets(content: Content) -> tuple[Sets, Sets, Sets]:
     """Return the numbers of elements of each material and of each other set, and those of nodes.
 
     What vertices are in is a set of nodes.
     """
     materials: Sets = {}
     elements: Sets = {}
-    nodes = {name: [rows + 1] for name, rows in content.point_sets.items()}
+    nodes = {name: [content.nodes[rows]] for name, rows in content.point_sets.items()}
+    ids = content.elements
     places = {id(run): i for i, run in enumerate(content.cells)}
     named: list[tuple[str, int, Int64]] = []
     for run, number, rows in content.parts() if content.regions is not None else ():
         i, key = places[id(run)], (dimension_of(run.type), number)
-        if key[0] == content.dimension and len(ids[i]):
+        if key[0] == content.dimension and run.type in HELD:
             materials.setdefault(content.title(*key), []).append(ids[i][rows])
         elif key in content.titles:
             named.append((content.titles[key], i, rows))
     named += [(name, i, rows) for name, runs in content.sets.items() for i, rows in enumerate(runs) if len(rows)]
     for name, i, rows in named:
-        if len(ids[i]):
+        if content.cells[i].type in HELD:
             elements.setdefault(name, []).append(ids[i][rows])
         elif content.cells[i].type == "vertex":
-            nodes.setdefault(name, []).append(content.cells[i].vertices[rows, 0] + 1)
+            nodes.setdefault(name, []).append(content.nodes[content.cells[i].vertices[rows, 0]])
     return materials, elements, nodes
 
 

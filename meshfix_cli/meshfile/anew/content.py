@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import dimension_of
 from meshfix_cli.meshfile.groups import Group, groups_of
+from meshfix_cli.meshfile.numbering import numbers_of, numbers_of_nodes
 from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Points
 
@@ -29,6 +30,10 @@ class Content:
     points : (n, d) float64
     cells : sequence of Cells
         One run for each type.
+    nodes : (n,) int64
+        The numbers of the points in formats that have such.
+    elements : sequence of (m,) int64
+        Those of the cells of each run.
     regions : sequence of (m,) int64, or None
         A number for each cell of each run, that of its material; None: nothing tells materials apart.
     titles : dict
@@ -45,6 +50,8 @@ class Content:
 
     points: Points
     cells: Sequence[Cells]
+    nodes: Int64
+    elements: Sequence[Int64]
     regions: Sequence[Int64] | None
     titles: Mapping[tuple[int, int], str]
     sets: Mapping[str, Sequence[Int64]]
@@ -81,7 +88,9 @@ class Content:
             if key not in titles:
                 titles[key] = name
                 del sets[name]
-        return cls(points, source.cells, labels, titles, sets, point_sets, arrays, region)
+        nodes, elements = numbers_of_nodes(source), [numbers_of(run) for run in source.cells]
+        nodes = np.arange(1, len(points) + 1) if nodes is None else nodes
+        return cls(points, source.cells, nodes, elements, labels, titles, sets, point_sets, arrays, region)
 
     def title(self, dimension: int, number: int) -> str:
         """Return what a material is called; one without a name by its number."""
@@ -93,6 +102,10 @@ class Content:
             labels = np.zeros(len(run.vertices), dtype=np.int64) if self.regions is None else self.regions[i]
             for number in np.unique(labels).tolist():
                 yield run, number, np.flatnonzero(labels == number)
+
+    def nodes_of(self, vertices: NDArray[np.integer[Any]]) -> Int64:
+        """Return the numbers (m, k) of vertices; 0 where there is none."""
+        return np.append(self.nodes, 0)[vertices]
 
     @property
     def dimension(self) -> int:

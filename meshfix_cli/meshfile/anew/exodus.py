@@ -1,7 +1,7 @@
 """Exodus II: a block for each material and type, sets of nodes, sides and elements, fields of one step.
 
-The numbers of elements are their places among all of the mesh: blocks part what stood together. Materials that blocks
-cannot tell, for these have one type and a number of their own, are a field as well.
+The numbers of elements without any are their places among all of the mesh: blocks part what stood together. Materials
+that blocks cannot tell, for these have one type and a number of their own, are a field as well.
 
 Source: L. A. Schoof, V. R. Yarberry, "EXODUS II: a finite element data model", SAND92-2137; SEACAS, "exodusII_int.h".
 """
@@ -27,12 +27,13 @@ _SHAPES = {
     "wedge": "WEDGE", "hexahedron": "HEX",
 }  # fmt: skip
 _BARE = ("vertex", "tetra", "pyramid", "wedge")  # which not all readers know with the number of nodes
-_HELD = (
+HELD = (
     *_SHAPES, "line3", "triangle6", "triangle7", "quad8", "quad9", "tetra10", "pyramid13", "pyramid14", "pyramid19",
     "wedge12", "wedge15", "wedge18", "hexahedron20", "hexahedron27",
 )  # fmt: skip
+MOST = 2**31 - 1
 _LONGEST = 32  # characters of names that all readers take
-_MOST = 255
+_MOST_LONG = 255
 
 
 class _Block(NamedTuple):
@@ -66,12 +67,14 @@ class _File:
         kept = {block.run for block in self.blocks}
         ends = np.cumsum([len(run.vertices) if i in kept else 0 for i, run in enumerate(content.cells)])
         self.starts = [0, *ends.tolist()]
-        self.ids = np.concatenate([np.empty(0, np.int64), *(self.starts[b.run] + b.rows + 1 for b in self.blocks)])
-        self.places = np.empty(len(self.ids), dtype=np.int64)  # in the file, of each cell
-        self.places[self.ids - 1] = np.arange(len(self.ids)) + 1
+        none = np.empty(0, dtype=np.int64)
+        self.ids = np.concatenate([none, *(content.elements[b.run][b.rows] for b in self.blocks)])
+        order = np.concatenate([none, *(self.starts[b.run] + b.rows for b in self.blocks)])
+        self.places = np.empty(len(order), dtype=np.int64)  # in the file, of each cell
+        self.places[order] = np.arange(len(order)) + 1
         names = [*content.titles.values(), *content.sets, *content.point_sets, *self.fields()]
         longest = max((len(name.encode()) for name in names), default=0) + len("_hexahedron27")
-        self.longest = _LONGEST if longest <= _LONGEST else min(longest, _MOST)
+        self.longest = _LONGEST if longest <= _LONGEST else min(longest, _MOST_LONG)
 
     def write(self) -> None:
         """Fill the file."""
@@ -103,6 +106,8 @@ class _File:
         for axis in range(self.dimension):
             self._put(f"coord{'xyz'[axis]}", ["num_nodes"], points[:, axis])
         self._names("coor_names", "num_dim", ["x", "y", "z"][: self.dimension])
+        if not np.array_equal(self.content.nodes, np.arange(1, len(points) + 1)):
+            self._put("node_num_map", ["num_nodes"], self.content.nodes.astype(np.int32))
 
     def _blocks(self) -> None:
         names = words_of([b.title for b in self.blocks if b.title], IN_XML, self.longest)
@@ -245,7 +250,7 @@ class _File:
 
 def _blocks(content: Content) -> Iterator[_Block]:
     """Number the parts of the mesh as their materials are, where no other has the number."""
-    parts = [part for part in content.parts() if part[0].type in _HELD]
+    parts = [part for part in content.parts() if part[0].type in HELD]
     taken: set[int] = set()
     free = max((label for _, label, _ in parts if label < 1 << 30), default=0)
     runs = {id(run): i for i, run in enumerate(content.cells)}

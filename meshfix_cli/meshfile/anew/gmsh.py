@@ -23,8 +23,9 @@ from meshfix_cli.meshfile.gmsh.cells import TYPES, order_of
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import PHYSICAL, Cells
 
-_KINDS = {key: kind for kind, (key, _) in TYPES.items()}
-_MOST = 100_000  # runs of elements of one entity, each of which has a header
+HELD = {key: kind for kind, (key, _) in TYPES.items()}
+MOST = 2**31 - 1
+_MOST_RUNS = 100_000  # of elements of one entity, each of which has a header
 
 
 class _Out(NamedTuple):
@@ -67,7 +68,7 @@ def written(content: Content, form: Format) -> bytes:
     kept = [
         i
         for i, run in enumerate(content.cells)
-        if run.type in _KINDS and len(run.vertices) and run.vertices.min() >= 0  # none lacks a node
+        if run.type in HELD and len(run.vertices) and run.vertices.min() >= 0  # none lacks a node
     ]
     if not kept:
         raise WriteError(f"cannot be written as {form.name}: that holds no {words(content.cells[0].type)[1]}")
@@ -77,9 +78,8 @@ def written(content: Content, form: Format) -> bytes:
         names = "".join(f'{d} {number} "{_quoted(name)}"\n' for d, number, name in groups.titles)
         parts.append(_section("PhysicalNames", f"{len(groups.titles)}\n{names}".encode()))
     parts += (_version_2 if old else _version_4)(content, groups, kept, out)
-    tags = np.arange(1, len(content.points) + 1)
-    parts += [_view("NodeData", name, values, tags, out) for name, values in content.arrays.point.items()]
-    ids = np.concatenate([np.empty(0, dtype=np.int64), *_ids(content.cells, kept)])
+    parts += [_view("NodeData", name, values, content.nodes, out) for name, values in content.arrays.point.items()]
+    ids = np.concatenate([content.elements[i] for i in kept])
     for name, values in _data(content, groups, kept):
         parts.append(_view("ElementData", name, values, ids, out))
     return b"".join(parts)
@@ -94,33 +94,27 @@ def _quoted(name: str) -> str:
     return " ".join(name.replace('"', "'").splitlines())
 
 
-def _ids(cells: Sequence[Cells], kept: Sequence[int]) -> list[Int64]:
-    """Number the kept elements from 1."""
-    ends = np.cumsum([0, *(len(cells[i].vertices) for i in kept)]).tolist()
-    return [np.arange(begin + 1, end + 1) for begin, end in pairwise(ends)]
-
-
-def _nodes(run: Cells) -> Int64:
-    """Return the numbers (m, k) of the nodes in gmsh's order."""
+def _table(content: Content, i: int) -> Int64:
+    """Return the numbers (m, 1 + k) of the elements of a run, and of their nodes in gmsh's order."""
+    run = content.cells[i]
     order = order_of(run.type)
-    nodes: Int64 = (run.vertices if order is None else run.vertices[:, np.argsort(order)]).astype(np.int64) + 1
-    return nodes
+    nodes = content.nodes_of(run.vertices if order is None else run.vertices[:, np.argsort(order)])
+    return np.column_stack([content.elements[i], nodes])
 
 
 def _version_2(content: Content, groups: Groups, kept: Sequence[int], out: _Out) -> Iterator[bytes]:
     """Give nodes, and elements of which each has a group and an entity."""
     n, points = len(content.points), content.in_space()
-    yield _section("Nodes", f"{n}\n".encode(), out.rows("i4", np.arange(1, n + 1)[:, None], points), b"\n" * out.binary)
-    ids = _ids(content.cells, kept)
-    parts = [f"{sum(map(len, ids))}\n".encode()]
-    for i, mine in zip(kept, ids, strict=True):
-        run, kind = content.cells[i], _KINDS[content.cells[i].type]
-        columns = [mine, groups.physical[i], groups.entities[i]]
+    yield _section("Nodes", f"{n}\n".encode(), out.rows("i4", content.nodes[:, None], points), b"\n" * out.binary)
+    parts = [f"{sum(len(content.elements[i]) for i in kept)}\n".encode()]
+    for i in kept:
+        table, kind = _table(content, i), HELD[content.cells[i].type]
+        columns = [groups.physical[i], groups.entities[i]]
         if out.binary:
-            parts.append(out.head("3i", kind, len(mine), 2))
+            parts.append(out.head("3i", kind, len(table), 2))
         else:
-            columns[1:1] = [np.full(len(mine), kind), np.full(len(mine), 2)]
-        parts.append(out.rows("i4", np.column_stack([*columns, _nodes(run)])))
+            columns[:0] = [np.full(len(table), kind), np.full(len(table), 2)]
+        parts.append(out.rows("i4", np.column_stack([table[:, 0], *columns, table[:, 1:]])))
     yield _section("Elements", *parts, b"\n" * out.binary)
 
 
@@ -132,33 +126,36 @@ def _version_4(content: Content, groups: Groups, kept: Sequence[int], out: _Out)
     yield _section("Entities", *_entities(points, groups, runs, out), end)
     owners, keys = _owners(len(points), runs)
     starts = _changes(owners)
-    if len(starts) > _MOST:  # of a mesh whose nodes are in no order of entities
+    if len(starts) > _MOST_RUNS:  # of a mesh whose nodes are in no order of entities
         owners, starts = np.full(len(points), owners.max()), [0]
-    tags = np.arange(1, len(points) + 1)[:, None]
+    tags = content.nodes[:, None]
     sizes = np.diff([*starts, len(points)]).tolist()
     numbers = out.cut(out.rows("u8", tags), len(points), starts)
     places = out.cut(out.rows("u8", tags[:, :0], points), len(points), starts)
-    blocks: list[bytes | memoryview] = [out.head("4Q", len(starts), len(points), 1, len(points))]
+    blocks: list[bytes | memoryview] = [out.head("4Q", len(starts), len(points), *_range(tags))]
     for owner, size, mine, there in zip(owners[starts].tolist(), sizes, numbers, places, strict=True):
         blocks += [out.head("3iQ", *keys[owner], 0, size), mine, there]
     yield _section("Nodes", *blocks, end)
-    yield _section("Elements", *_elements(runs, out), end)
+    yield _section("Elements", *_elements(runs, [_table(content, i) for i in kept], out), end)
 
 
-def _elements(runs: Sequence[tuple[Cells, Int64]], out: _Out) -> list[bytes | memoryview]:
+def _range(*numbers: Int64) -> tuple[int, int]:
+    """Return the smallest and the largest number."""
+    return min(int(mine.min()) for mine in numbers), max(int(mine.max()) for mine in numbers)
+
+
+def _elements(runs: Sequence[tuple[Cells, Int64]], tables: Sequence[Int64], out: _Out) -> list[bytes | memoryview]:
     """Return a block for each run of elements of one entity."""
     starts = [_changes(entities) for _, entities in runs]
-    count, m = sum(map(len, starts)), sum(len(entities) for _, entities in runs)
-    if count > _MOST:
+    count = sum(map(len, starts))
+    if count > _MOST_RUNS:
         raise WriteError(f"cannot be written as gmsh: its groups change {count:,} times, so use --format gmsh22")
-    parts: list[bytes | memoryview] = [out.head("4Q", count, m, 1, m)]
-    behind = 1
-    for (run, entities), begin in zip(runs, starts, strict=True):
-        ids = np.arange(behind, behind + len(entities))
-        behind += len(entities)
-        rows = out.cut(out.rows("u8", np.column_stack([ids, _nodes(run)])), len(ids), begin)
-        sizes = np.diff([*begin, len(ids)]).tolist()
-        about = dimension_of(run.type), _KINDS[run.type]
+    about = [count, sum(map(len, tables)), *_range(*(table[:, 0] for table in tables))]
+    parts: list[bytes | memoryview] = [out.head("4Q", *about)]
+    for (run, entities), table, begin in zip(runs, tables, starts, strict=True):
+        rows = out.cut(out.rows("u8", table), len(table), begin)
+        sizes = np.diff([*begin, len(table)]).tolist()
+        about = [dimension_of(run.type), HELD[run.type]]
         for entity, size, mine in zip(entities[begin].tolist(), sizes, rows, strict=True):
             parts += [out.head("3iQ", about[0], entity, about[1], size), mine]
     return parts

@@ -20,27 +20,25 @@ from meshfix_cli.meshfile.anew.tables import beside, in_columns
 from meshfix_cli.meshfile.nastran.elements import ORDER
 from meshfix_cli.meshfile.recognise import Format
 
-_NAMES = {
+HELD = {
     "line": "CROD", "line3": "CBEAM3", "triangle": "CTRIA3", "triangle6": "CTRIA6", "quad": "CQUAD4", "quad8": "CQUAD8",
     "quad9": "CQUAD", "tetra": "CTETRA", "tetra10": "CTETRA", "pyramid": "CPYRAM", "pyramid13": "CPYRAM",
     "wedge": "CPENTA", "wedge15": "CPENTA", "hexahedron": "CHEXA", "hexahedron20": "CHEXA",
 }  # fmt: skip
-_MOST = 10**8 - 1  # of 8 columns
+MOST = 10**8 - 1  # of 8 columns
 
 
 def written(content: Content, _: Format) -> bytes:
     """Return a deck; properties are the materials, and sets of elements that have none."""
-    kept = [i for i, run in enumerate(content.cells) if run.type in _NAMES and len(run.vertices)]
-    if max(len(content.points), sum(len(content.cells[i].vertices) for i in kept)) > _MOST:
+    kept = [i for i, run in enumerate(content.cells) if run.type in HELD and len(run.vertices)]
+    if max(len(content.points), sum(len(content.cells[i].vertices) for i in kept)) > MOST:
         raise WriteError("cannot be written as nastran: numbers have 8 digits, and there are too many")
-    parts, behind = [b"CEND\nBEGIN BULK\n", _points(content)], 1
+    parts = [b"CEND\nBEGIN BULK\n", _points(content)]
     for i, properties in zip(kept, _properties(content, kept), strict=True):
         run = content.cells[i]
         order = np.argsort(ORDER[run.type]) if run.type in ORDER else slice(None)
-        ids = np.arange(behind, behind + len(run.vertices))
-        behind += len(ids)
-        table = np.column_stack([ids, properties, run.vertices[:, order] + 1])
-        parts.append(in_columns(f"{_NAMES[run.type]:8}", table, 8, 8, "+       "))
+        table = np.column_stack([content.elements[i], properties, content.nodes_of(run.vertices[:, order])])
+        parts.append(in_columns(f"{HELD[run.type]:8}", table, 8, 8, "+       "))
     parts += _constraints(content)
     return b"".join([*parts, b"ENDDATA\n"])
 
@@ -50,7 +48,7 @@ def _points(content: Content) -> bytes:
     points = np.nan_to_num(content.in_space(), posinf=0.0, neginf=0.0)  # those of no element may be anything
     n = len(points)
     fields = np.frombuffer(kernels.write_fields(points.ravel(), 16, True)[0], dtype=np.uint8).reshape(n, 48)
-    numbers = in_columns("GRID*   ", np.arange(1, n + 1)[:, None], 16, 4, "")
+    numbers = in_columns("GRID*   ", content.nodes[:, None], 16, 4, "")
     head, first = np.frombuffer(numbers, dtype=np.uint8).reshape(n, 25)[:, :24], fields[:, :32]
     blank, begin, end = (np.frombuffer(text, dtype=np.uint8) for text in (b" " * 16, b"\n*       ", b"\n"))
     return beside(head, blank, first, begin, fields[:, 32:], end)
@@ -60,13 +58,13 @@ def _properties(content: Content, kept: Sequence[int]) -> list[Int64]:
     """Return the number of the property of each element: that of its group, if no element of more dimensions has it."""
     groups = groups_of(content, several=False).physical
     used = {i: np.unique(groups[i]).tolist() for i in kept}
-    free = max([0, *(number for mine in used.values() for number in mine if number <= _MOST - len(used))]) + 1
+    free = max([0, *(number for mine in used.values() for number in mine if number <= MOST - len(used))]) + 1
     taken: dict[int, int] = {}
     new: dict[tuple[int, int], int] = {}
     for i in sorted(kept, key=lambda i: -dimension_of(content.cells[i].type)):
         dimension = dimension_of(content.cells[i].type)
         for number in used[i]:
-            whole = 0 < number <= _MOST and taken.setdefault(number, dimension) == dimension
+            whole = 0 < number <= MOST and taken.setdefault(number, dimension) == dimension
             if not whole and (dimension, number) not in new:
                 new[dimension, number], free = free, free + 1
     found = []
@@ -83,7 +81,7 @@ def _constraints(content: Content) -> Iterator[bytes]:
     for name, rows in content.point_sets.items():
         free += name not in own
         number = own.get(name, free)
-        cards = rows + 1
+        cards = content.nodes[rows]
         whole = len(cards) // 6 * 6
         for some in (cards[:whole].reshape(-1, 6), cards[None, whole:]):
             if some.size:

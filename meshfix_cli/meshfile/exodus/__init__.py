@@ -26,7 +26,7 @@ _COORDINATES = ("coordx", "coordy", "coordz")
 # Variables that are read, or say nothing of their own; those of a file of HDF5 have one for each dimension, too.
 _TOLD = re.compile(
     r"coord[xyz]?|coor_names|(connect|facconn|fbconn|ebepecnt|fbepecnt|node_ns|elem_ss|side_ss|elem_els)\d+"
-    r"|(eb|ns|ss|els)_(names|status|prop1)|elem_num_map|name_(nod|elem)_var|vals_nod_var\d*|vals_elem_var\d+eb\d+"
+    r"|(eb|ns|ss|els)_(names|status|prop1)|(elem|node)_num_map|name_(nod|elem)_var|vals_nod_var\d*|vals_elem_var\d+eb\d+"
     r"|elem_var_tab|time_whole|(num|len)_.*|time_step|four"
 )
 
@@ -46,14 +46,22 @@ def source_of(variables: Variables, again: Callable[[], AbstractContextManager[V
     runs = [(block, run) for block in found for run in block.runs]
     layout = variables.layout(table, [partial(_corners, block.table, run) for block, run in runs])
     flat = np.concatenate([named[name].values().ravel() for name in table.sets])
-    ids = numbers(named, "elem_num_map")
+    ids, nodes = numbers(named, "elem_num_map"), numbers(named, "node_num_map")
     untold = tuple(_untold(named))
     if len(ids) != sum(block.size for block in found):
         ids = np.arange(1, sum(block.size for block in found) + 1)
     cells = [Cells(run.type, run.vertices, ids[run.rows + block.first]) for block, run in runs]
     load = partial(_arrays, again, found, n, dimension)
     regions = regions_of(titles(named, "name_elem_var"))
-    return Source(np.ascontiguousarray(flat[table.at]), cells, layout, load, regions, untold=untold)
+    return Source(
+        np.ascontiguousarray(flat[table.at]),
+        cells,
+        layout,
+        load,
+        regions,
+        untold=untold,
+        numbers=lambda: nodes if len(nodes) == n else None,
+    )
 
 
 def _coordinates(named: Named) -> Table:

@@ -74,9 +74,6 @@ def _source(data: bytes, file: File, labels: dict[str, list[Int64]]) -> Source:
     by_corner = "section $ElementNodeData" in file.untold
     layout = InPlace(data, coordinates, [_refuse if by_corner else partial(_corners, block) for block in file.blocks])
     load, regions = partial(_load, file, tags, cells, labels), _regions(file, cells, labels)
-    for what, numbers in (("nodes", tags), ("elements", _ids(cells))):
-        if not np.array_equal(numbers, np.arange(1, len(numbers) + 1)):
-            file.untold[f"numbers of {what}"] = None
     notes = ("the parameters (u, v) of nodes on curves and faces stay as they are",) * file.parametric
     points = coordinates.read(data)
     held = _paired(file, find, len(tags))

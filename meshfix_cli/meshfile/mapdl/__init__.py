@@ -55,6 +55,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(archive.text), runs.cells, InPlace(data, coordinates, runs.corners),
         partial(runs.arrays, point_sets), (_MATERIAL, _TYPE) if runs.cells else (), held, ("commands",),
+        numbers=lambda: numbers,
     )  # fmt: skip
 
 

@@ -43,6 +43,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(data), runs.cells, InPlace(data, coordinates, runs.corners), lambda: arrays,
         (REF,) * (REF in arrays.cell), held, _untold(deck),
+        numbers=lambda: numbering.numbers,
     )  # fmt: skip
 
 

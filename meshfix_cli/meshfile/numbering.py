@@ -1,8 +1,8 @@
-"""The numbers that files give to nodes and elements: which of them another format has as well, and which are lost."""
+"""The numbers that files give to nodes and elements: those that another format has as well, and new ones."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -49,31 +49,6 @@ def numbered(source: Source, held: Sequence[str], most: int) -> Source:
     return replace(source, cells=cells, numbers=lambda: nodes)
 
 
-def lost(source: Source, other: Source) -> Iterator[str]:
-    """Say which numbers another source, written from one of the same order, does not have.
-
-    Those that tell no more than the order does are not lost.
-    """
-    nodes = numbers_of_nodes(source)
-    if nodes is not None and not _are_order([nodes]):
-        theirs = numbers_of_nodes(other)
-        also = other.arrays.point.values()  # as VTK has them
-        if not any(np.array_equal(nodes, values) for values in (theirs, *also) if values is not None):
-            yield "numbers of nodes"
-    runs = {run.type: run for run in other.cells}
-    pairs = [(numbers_of(run), runs[run.type]) for run in source.cells if run.type in runs and run.ids is not None]
-    if not _are_order([mine for mine, _ in pairs]) and not all(_has(run, mine) for mine, run in pairs):
-        yield "numbers of elements"
-
-
-def _has(run: Cells, numbers: Int64) -> bool:
-    """Whether cells have such numbers, one for each."""
-    some = numbers != NO_NUMBER
-    if run.ids is None or len(run.ids) != len(numbers):
-        return not some.any()
-    return np.array_equal(run.ids[some], numbers[some])
-
-
 def _unique(numbers: Int64 | None, count: int, most: int) -> Int64:
     """Return numbers (count,), with others behind them for what has none; from 1 where they cannot be had."""
     if numbers is not None:
@@ -90,15 +65,3 @@ def _unique(numbers: Int64 | None, count: int, most: int) -> Int64:
 
 def _are_different(numbers: Int64) -> bool:
     return bool((numbers[1:] > numbers[:-1]).all() or (np.diff(np.sort(numbers)) > 0).all())
-
-
-def _are_order(runs: Sequence[Int64]) -> bool:
-    """Whether numbers only count, all of them or those of each run, from 0 or 1; from 0 they are places in a file."""
-    given = [numbers[numbers != NO_NUMBER] for numbers in runs]
-    whole = np.concatenate([np.empty(0, dtype=np.int64), *given])
-    places = np.sort(whole) if len(whole) and not whole.min() else whole
-    return _counts(places) or all(map(_counts, given))
-
-
-def _counts(numbers: Int64) -> bool:
-    return not len(numbers) or (numbers[0] in (0, 1) and np.array_equal(numbers, numbers[0] + np.arange(len(numbers))))

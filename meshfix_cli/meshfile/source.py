@@ -287,25 +287,6 @@ class Source:
         """How many cells stand before each of some runs when these are joined."""
         return [0, *accumulate(len(self.cells[i].vertices) for i in runs[:-1])]
 
-    def lost_in(self, other: Source) -> tuple[str, ...]:
-        """Name what another source, written from this one, does not hold."""
-        mine, theirs = self.arrays, other.arrays
-        types = {run.type for run in other.cells}
-        lost = [f"{run.type} cells" for run in self.cells if run.type not in types]
-        found = [np.asarray(values) for values in theirs.point.values()]
-        lost += [f"point data {name}" for name, values in mine.point.items() if not _is_among(values, found)]
-        found = [np.concatenate(runs) for runs in theirs.cell.values()]
-        for name, runs in mine.cell.items():
-            values, others = np.concatenate(runs), found
-            if name in self.regions and values.ndim == 1 and values.dtype.kind in "iuf":
-                some = values != 0  # 0 is no region, and another format may number what is in none
-                values, others = values[some], [one[some] for one in found if len(one) == len(some)]
-            if not _is_among(values, others):
-                lost.append(f"cell data {name}")
-        held = {*theirs.groups, *theirs.point_sets, *theirs.cell_sets}
-        lost += [f"group {name}" for name in (*mine.groups, *mine.point_sets, *mine.cell_sets) if name not in held]
-        return (*dict.fromkeys((*lost, *mine.unread)), *self.untold)
-
 
 def ghost_vertices(cells: Sequence[Cells], n: int) -> NDArray[np.bool_] | None:
     """Mark the points (n,) of ghost cells; None: no cells are marked so."""
@@ -333,18 +314,3 @@ def _in(order: NDArray[np.int64], run: Cells) -> Cells:
 
 def _joined(parts: Sequence[Any]) -> Any:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
-
-
-def _is_among(values: Any, found: Sequence[NDArray[Any]]) -> bool:
-    """Whether one of some arrays has the same values, but for what seven digits cannot hold."""
-    mine = np.asarray(values).ravel()
-    for other in found:
-        theirs = other.ravel()
-        if mine.size != theirs.size:
-            continue
-        if mine.dtype.kind in "fiu" and theirs.dtype.kind in "fiu":
-            if np.allclose(mine, theirs, 1e-6, 0.0, equal_nan=True):
-                return True
-        elif np.array_equal(mine, theirs):
-            return True
-    return False

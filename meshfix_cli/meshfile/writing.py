@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import MeshfixError, WriteError
 from meshfix_cli.mesh.elements import dimension_of, words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.meshfile import anew, compressed, foreign, formats, numbering
+from meshfix_cli.meshfile import anew, compressed, foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
 from meshfix_cli.meshfile.document import Document
 from meshfix_cli.meshfile.formats import PARTS
+from meshfix_cli.meshfile.lost import lost
 from meshfix_cli.meshfile.reading import parse
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import in_common_types, solved_runs
@@ -301,7 +302,7 @@ def _write_anew(
             raise WriteError(f"cannot be written as {form.name}: that holds no {words(lacking.type)[1]}{where}")
         corners = _spatial(back.points)[np.concatenate([rows.ravel() for rows in found])]
         difference = np.abs(corners - _spatial(held)[expected]).max()
-        dropped = (*source.lost_in(back), *numbering.lost(source, back))
+        dropped = lost(source, back)
         if back.arrays.unread:
             raise WriteError(f"cannot be written as {form.name}: it would hold {back.arrays.unread[0]}")
     except WriteError:

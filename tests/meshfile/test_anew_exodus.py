@@ -14,6 +14,7 @@ from splicing import MODULES, make
 from meshfix_cli import read, write
 from meshfix_cli.meshfile import anew
 from meshfix_cli.meshfile.groups import groups_of
+from meshfix_cli.meshfile.lost import lost
 from meshfix_cli.meshfile.reading import parse
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
@@ -104,7 +105,7 @@ def test_blocks_alone_tell_materials_that_have_one_type(tmp_path: Path) -> None:
     assert [run.ids.tolist() for run in back.cells if run.ids is not None] == [[1, 3], [2]]
     assert [values.tolist() for values in back.arrays.cell["exodus:block"]] == [[4, 4], [9]]
     assert back.arrays.groups.keys() == {"a name of more than thirty-two characters", "block_9"}
-    assert source.lost_in(back.in_order()) == ("cell data six",)
+    assert lost(source, back.in_order()) == ("cell data six",)
 
 
 @pytest.mark.parametrize(("reader", "variant"), [("abaqus", None), ("gmsh", "groups_text_4.msh"), ("vtu", None)])

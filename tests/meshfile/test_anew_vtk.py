@@ -17,6 +17,7 @@ from meshfix_cli.mesh.lagrange import kinds
 from meshfix_cli.meshfile import anew
 from meshfix_cli.meshfile.formats import sniff
 from meshfix_cli.meshfile.groups import groups_of
+from meshfix_cli.meshfile.lost import lost
 from meshfix_cli.meshfile.reading import parse
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
@@ -142,7 +143,7 @@ def test_odd_names_and_types_of_numbers(form: Format) -> None:
     np.testing.assert_array_equal(back.arrays.point["largest"], arrays.point["largest"])
     assert back.arrays.point["single"].dtype == np.float32
     assert groups_of(back)["truth"].nodes.tolist() == [0, 2]
-    assert source.lost_in(back) == ("group probe",)
+    assert lost(source, back) == ("group probe",)
 
 
 @each_form

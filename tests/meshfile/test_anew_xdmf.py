@@ -12,6 +12,7 @@ from splicing import MODULES, make
 
 from meshfix_cli import read, write
 from meshfix_cli.meshfile import anew
+from meshfix_cli.meshfile.lost import lost
 from meshfix_cli.meshfile.reading import parse
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
@@ -72,7 +73,7 @@ def test_vertices_and_lines_stand_among_others(tmp_path: Path) -> None:
     back = parse(anew.written(source, points, XDMF), XDMF)
     assert {run.type: run.vertices.tolist() for run in back.cells} == tables
     assert back.regions == ("MaterialIDs",)
-    assert source.lost_in(back) == ()
+    assert lost(source, back) == ()
     alone = Source(points, source.cells[1:2])
     assert parse(anew.written(alone, points, XDMF), XDMF).cells[0].vertices.tolist() == tables["line"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,37 +10,18 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-from laden import document_of, elements_of, laden, nodes_of, places, with_numbers
+from laden import box, document_of, elements_of, laden, nodes_of, places, with_numbers, written
 from named_groups import named
 from programs import gmsh_session
 
-from meshfix_cli import read, write
-from meshfix_cli.meshfile.document import build
+from meshfix_cli import write
 from meshfix_cli.meshfile.recognise import Format
-from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.source import Cells
 
 GMSH = [Format(name, binary) for name in ("gmsh22", "gmsh") for binary in (False, True)]
 NUMBERED = [*GMSH, Format("abaqus"), Format("nastran"), Format("exodus")]
 LARGEST = {"gmsh22": 2**31 - 1, "gmsh": 2**31 - 1, "abaqus": 10**9 - 1, "nastran": 10**8 - 1, "exodus": 2**31 - 1}
 BOTH = ("numbers of nodes", "numbers of elements")
-
-
-def box(nodes: Sequence[int] | None, *ids: Sequence[int] | None) -> Source:
-    """Two tetrahedra and two of their facets, of no data."""
-    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
-    tables = {"tetra": [[0, 1, 2, 3], [1, 2, 3, 4]], "triangle": [[0, 2, 1], [0, 1, 3]]}
-    cells = [
-        Cells(key, np.array(rows), None if mine is None else np.array(mine))
-        for (key, rows), mine in zip(tables.items(), ids, strict=True)
-    ]
-    return Source(points, cells, load=Arrays, numbers=lambda: None if nodes is None else np.array(nodes))
-
-
-def written(source: Source, form: Format, path: Path) -> tuple[Source, tuple[str, ...]]:
-    """A source as it is read again, and what was dropped."""
-    document = build("in", source, Format("memory"), (), None)
-    _, dropped = write(document, document.mesh, path, form)
-    return read(path).source, dropped
 
 
 def in_gmsh(path: Path) -> tuple[dict[Any, int], dict[Any, int]]:

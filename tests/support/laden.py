@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ from building import Blocks
 from elements import MESHES
 from refined import COMPLETE, SERENDIPITY, refined
 
+from meshfix_cli import read, write
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.document import Document, build
 from meshfix_cli.meshfile.groups import groups_of
@@ -113,3 +116,23 @@ def elements_of(source: Source) -> dict[tuple[Any, ...], int]:
         for row, number in zip(run.vertices.tolist(), [] if run.ids is None else run.ids.tolist(), strict=False):
             found[(run.type, *sorted(at[i] for i in row))] = number
     return found
+
+
+def box(nodes: Sequence[int] | None = None, *ids: Sequence[int] | None, arrays: Arrays | None = None) -> Source:
+    """Two tetrahedra and two of their facets."""
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+    tables = {"tetra": [[0, 1, 2, 3], [1, 2, 3, 4]], "triangle": [[0, 2, 1], [0, 1, 3]]}
+    cells = [
+        Cells(key, np.array(rows), None if mine is None else np.array(mine))
+        for (key, rows), mine in zip(tables.items(), ids or (None, None), strict=True)
+    ]
+    return Source(
+        points, cells, load=lambda: arrays or Arrays(), numbers=lambda: None if nodes is None else np.array(nodes)
+    )
+
+
+def written(source: Source, form: Format, path: Path) -> tuple[Source, tuple[str, ...]]:
+    """A source as it is read again, and what was dropped."""
+    document = build("in", source, Format("memory"), (), None)
+    _, dropped = write(document, document.mesh, path, form)
+    return read(path).source, dropped

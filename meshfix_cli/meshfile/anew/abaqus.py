@@ -80,9 +80,11 @@ def _sets(content: Content) -> tuple[Sets, Sets, Sets]:
 
 def _words(names: Sequence[str]) -> dict[str, str]:
     """Return names that begin with a letter; Abaqus does not tell small letters from capitals."""
-    begun = [name if re.match("[A-Za-z]", name) else f"set_{name}" for name in names]
-    words = words_of(begun, r"A-Za-z0-9_-", lower=True)
-    return {name: words[first] for name, first in zip(names, begun, strict=True)}
+    return words_of(names, r"A-Za-z0-9_-", lower=True, spelled=_begun)
+
+
+def _begun(name: str) -> str:
+    return name if re.match("[A-Za-z]", name) else f"set_{name}"
 
 
 def _set(keyword: str, word: str, parts: Sequence[Int64]) -> bytes:

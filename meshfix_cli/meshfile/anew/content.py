@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -118,30 +118,43 @@ class Content:
         return points if points.shape[1] == 3 else np.column_stack([points, np.zeros(len(points))])
 
 
-def words_of(names: Sequence[str], allowed: str = r"\w.+-", longest: int = 80, lower: bool = False) -> dict[str, str]:
-    """Return what names become where a format allows few characters: no two the same.
+def words_of(
+    names: Sequence[str],
+    allowed: str = r"\w.+-",
+    longest: int = 80,
+    lower: bool = False,
+    spelled: Callable[[str], str] = str,
+) -> dict[str, str]:
+    """Return what names become where a format allows few characters: no two the same, but for blanks around them.
 
     Parameters
     ----------
     allowed : str
         The characters, as in a class of a regular expression; of others an underscore stands for each run.
     longest : int
-        How many characters there may be.
+        How many bytes there may be.
     lower : bool
         Capital letters are none of their own.
+    spelled : callable
+        What is done with a name before that.
     """
     found: dict[str, str] = {}
     taken = set()
     for name in names:
-        word = first = re.sub(rf"[^{allowed}]+", "_", name)[:longest] or "_"
-        count = 1
-        while (word.lower() if lower else word) in taken:
+        first = re.sub(rf"[^{allowed}]+", "_", spelled(name)) or "_"
+        word, count = _cut(first, longest), 1
+        while (key := (word.lower() if lower else word).strip()) in taken:
             count += 1
             end = f"_{count}"
-            word = first[: longest - len(end)] + end
-        taken.add(word.lower() if lower else word)
+            word = _cut(first, longest - len(end)) + end
+        taken.add(key)
         found[name] = word
     return found
+
+
+def _cut(text: str, longest: int) -> str:
+    """Return as many characters as so many bytes hold."""
+    return text.encode()[:longest].decode(errors="ignore")
 
 
 def _is_told(group: Group, cells: Sequence[Cells], labels: Sequence[Int64], dimension: int, number: int) -> bool:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import WriteError
 from meshfix_cli.mesh.elements import dimension_of, words
-from meshfix_cli.meshfile.anew.content import Content, Int64
+from meshfix_cli.meshfile.anew.content import Content, Int64, words_of
 from meshfix_cli.meshfile.anew.gmsh_groups import Groups, groups_of
 from meshfix_cli.meshfile.anew.tables import integers, numbered, reals
 from meshfix_cli.meshfile.gmsh import ENTITY, SETS
@@ -25,6 +25,7 @@ from meshfix_cli.meshfile.source import PHYSICAL, Cells
 
 HELD = {key: kind for kind, (key, _) in TYPES.items()}
 MOST = 2**31 - 1
+_LONGEST = 200  # bytes of a name: gmsh reads lines of 255
 _MOST_RUNS = 100_000  # of elements of one entity, each of which has a header
 
 
@@ -75,18 +76,28 @@ def written(content: Content, form: Format) -> bytes:
     about = f"{'2.2' if old else '4.1'} {int(out.binary)} 8\n".encode()
     parts = [_section("MeshFormat", about, *[struct.pack("<i", 1), b"\n"] * out.binary)]
     if groups.titles:
-        names = "".join(f'{d} {number} "{_quoted(name)}"\n' for d, number, name in groups.titles)
+        called = _words(list(dict.fromkeys(name for _, _, name in groups.titles)))
+        names = "".join(f'{d} {number} "{called[name]}"\n' for d, number, name in groups.titles)
         parts.append(_section("PhysicalNames", f"{len(groups.titles)}\n{names}".encode()))
     parts += (_version_2 if old else _version_4)(content, groups, kept, out)
-    parts += [_view("NodeData", name, values, content.nodes, out) for name, values in content.arrays.point.items()]
     ids = np.concatenate([content.elements[i] for i in kept])
-    for name, values in _data(content, groups, kept):
-        parts.append(_view("ElementData", name, values, ids, out))
+    views = [
+        ("NodeData", content.nodes, dict(content.arrays.point)),
+        ("ElementData", ids, dict(_data(content, groups, kept))),
+    ]
+    for section, tags, arrays in views:
+        called = _words(list(arrays))
+        parts += [_view(section, called[name], values, tags, out) for name, values in arrays.items()]
     return b"".join(parts)
 
 
 def _section(name: str, *content: bytes | memoryview) -> bytes:
     return b"".join([f"${name}\n".encode(), *content, f"$End{name}\n".encode()])
+
+
+def _words(names: Sequence[str]) -> dict[str, str]:
+    """Return what names become, no two the same."""
+    return words_of(names, " -\U0010ffff", _LONGEST, spelled=_quoted)
 
 
 def _quoted(name: str) -> str:
@@ -222,9 +233,9 @@ def _data(content: Content, groups: Groups, kept: Sequence[int]) -> Iterator[tup
 def _view(section: str, name: str, values: Any, tags: Int64, out: _Out) -> bytes:
     """Return data of nodes or elements: its name, its step in time, and the values of those that have any."""
     values = np.asarray(values)
-    if values.dtype.kind not in "fiub" or not len(values):
+    if values.dtype.kind not in "fiub" or not values.size:
         return b""
     table = values.reshape(len(values), -1).astype(np.float64)
     there = ~np.isnan(table).all(axis=1)
-    head = f'1\n"{_quoted(name)}"\n1\n0.0\n3\n0\n{table.shape[1]}\n{there.sum()}\n'.encode()
+    head = f'1\n"{name}"\n1\n0.0\n3\n0\n{table.shape[1]}\n{there.sum()}\n'.encode()
     return _section(section, head, out.rows("i4", tags[there][:, None], table[there]), b"\n" * out.binary)

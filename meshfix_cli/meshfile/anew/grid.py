@@ -91,6 +91,8 @@ def _numbers(named: Iterable[tuple[str, Any]]) -> Iterator[tuple[str, NDArray[An
         values = np.asarray(array)
         kind = {"b": "u1", "f2": "f4", "f16": "f8"}
         dtype = kind.get(values.dtype.str[1:]) or kind.get(values.dtype.kind) or values.dtype
+        if values.dtype.kind == "u" and values.size and values.max() > np.iinfo(np.int64).max:
+            dtype = "f8"  # not all readers have a type for such
         if values.dtype.kind in "biuf" and values.size:
             values = values.astype(dtype, copy=False)
             yield name, values if values.ndim == 1 else values.reshape(len(values), -1)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.meshfile.anew.content import Content
+from meshfix_cli.meshfile.anew.content import Content, words_of
 from meshfix_cli.meshfile.anew.grid import Grid
 from meshfix_cli.meshfile.anew.tables import rows_of
 from meshfix_cli.meshfile.recognise import Format
@@ -20,6 +20,8 @@ _TYPES = {
     "i1": "char", "u1": "unsigned_char", "i2": "short", "u2": "unsigned_short", "i4": "int", "u4": "unsigned_int",
     "i8": "vtktypeint64", "u8": "vtktypeuint64", "f4": "float", "f8": "double",
 }  # fmt: skip
+
+_LONGEST = 200  # characters of a name: VTK reads lines of 255
 
 
 def written(content: Content, form: Format) -> bytes:
@@ -63,10 +65,11 @@ def _cells_of_5(grid: Grid, binary: bool) -> Iterator[bytes]:
 def _fields(arrays: Mapping[str, NDArray[Any]], old: bool, binary: bool) -> Iterator[bytes]:
     if arrays:
         yield f"FIELD FieldData {len(arrays)}\n".encode()
+    words = words_of(list(arrays), "!-~", _LONGEST, spelled=_name)
     for name, array in arrays.items():
         values = _narrow(array) if old else _wide(array)
         columns = 1 if values.ndim == 1 else values.shape[1]
-        yield f"{_name(name)} {columns} {len(values)} {_TYPES[values.dtype.str[1:]]}\n".encode()
+        yield f"{words[name]} {columns} {len(values)} {_TYPES[values.dtype.str[1:]]}\n".encode()
         yield _numbers(values, binary)
 
 

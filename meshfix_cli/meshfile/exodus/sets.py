@@ -52,7 +52,8 @@ def regions_of(names: Sequence[str]) -> tuple[str, ...]:
 
 def _whole(values: NDArray[Any]) -> NDArray[Any]:
     """Return labels, which fields hold as reals."""
-    return values.astype(np.int64) if (values == np.round(values)).all() else values
+    whole = (values == np.round(values)) & (np.abs(values) < 2**53)
+    return values.astype(np.int64) if whole.all() else values
 
 
 def _vectors(fields: Mapping[str, Sequence[NDArray[Any]]]) -> dict[str, list[NDArray[Any]]]:

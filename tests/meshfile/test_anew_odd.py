@@ -11,9 +11,12 @@ import pytest
 from laden import box, written
 from programs import gmsh_session
 
+from meshfix_cli.errors import WriteError
+from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.meshfile.groups import groups_of
 from meshfix_cli.meshfile.recognise import Format
-from meshfix_cli.meshfile.source import Arrays, Cells
+from meshfix_cli.meshfile.source import Arrays, Cells, Source
+from meshfix_cli.meshfile.writing import _write_anew
 
 FORMS = [
     *(Format(name, binary) for name in ("vtu", "vtk", "gmsh22", "gmsh") for binary in (False, True)),
@@ -90,3 +93,14 @@ def test_cells_of_a_type_that_are_left_out_in_part_are_named(form: Format, tmp_p
     source = replace(source, cells=[*source.cells, Cells("polygon", np.arange(5)[None]), Cells("polygon", ragged)])
     _, dropped = written(source, form, tmp_path / "out")
     assert dropped == ("polygon cells",)
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_formats_without_any_of_the_elements_say_so(form: Format, tmp_path: Path) -> None:
+    """Pyramids of 14 nodes, and hexahedra of 24 for those that have such pyramids."""
+    key = "hexahedron24" if form.name in ("gmsh22", "gmsh", "exodus") else "pyramid14"
+    kind = ELEMENTS[key]
+    points = np.random.default_rng(0).random((kind.nodes, 3))
+    source = Source(points, [Cells(key, np.arange(kind.nodes)[None])])
+    with pytest.raises(WriteError, match=f"{form.name}: that holds no "):
+        _write_anew(tmp_path / "out", source, points, form)

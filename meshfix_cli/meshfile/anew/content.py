@@ -10,9 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import dimension_of
+from meshfix_cli.errors import WriteError
+from meshfix_cli.mesh.elements import dimension_of, words
 from meshfix_cli.meshfile.groups import Group, groups_of
 from meshfix_cli.meshfile.numbering import numbers_of, numbers_of_nodes
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import PHYSICAL, Arrays, Cells, Source
 from meshfix_cli.meshfile.splice import Points
 
@@ -106,6 +108,10 @@ class Content:
     def nodes_of(self, vertices: NDArray[np.integer[Any]]) -> Int64:
         """Return the numbers (m, k) of vertices; 0 where there is none."""
         return np.append(self.nodes, 0)[vertices]
+
+    def refusal(self, form: Format) -> WriteError:
+        """Return what is raised where a format has none of the cells."""
+        return WriteError(f"cannot be written as {form.name}: that holds no {words(self.cells[0].type)[1]}")
 
     @property
     def dimension(self) -> int:

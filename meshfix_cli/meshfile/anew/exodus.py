@@ -46,10 +46,12 @@ class _Block(NamedTuple):
     rows: Int64
 
 
-def written(content: Content, _: Format) -> bytes:
+def written(content: Content, form: Format) -> bytes:
     """Return a file of netCDF with offsets of 64 bits."""
     from scipy.io import netcdf_file
 
+    if not any(_blocks(content)):
+        raise content.refusal(form)
     buffer = io.BytesIO()
     file = netcdf_file(buffer, "w", version=2)
     _File(file, content).write()

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import WriteError
-from meshfix_cli.mesh.elements import dimension_of, words
+from meshfix_cli.mesh.elements import dimension_of
 from meshfix_cli.meshfile.anew.content import Content, Int64, words_of
 from meshfix_cli.meshfile.anew.gmsh_groups import Groups, groups_of
 from meshfix_cli.meshfile.anew.tables import integers, numbered, reals
@@ -72,7 +72,7 @@ def written(content: Content, form: Format) -> bytes:
         if run.type in HELD and len(run.vertices) and run.vertices.min() >= 0  # none lacks a node
     ]
     if not kept:
-        raise WriteError(f"cannot be written as {form.name}: that holds no {words(content.cells[0].type)[1]}")
+        raise content.refusal(form)
     about = f"{'2.2' if old else '4.1'} {int(out.binary)} 8\n".encode()
     parts = [_section("MeshFormat", about, *[struct.pack("<i", 1), b"\n"] * out.binary)]
     if groups.titles:

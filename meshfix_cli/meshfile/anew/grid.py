@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.meshfile.anew.content import Content
+from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import regions_among
 from meshfix_cli.meshfile.vtk.cells import number_of, order_of
 
@@ -42,13 +43,21 @@ class Grid:
     about: Arrays
 
     @classmethod
-    def of(cls, content: Content, old: bool) -> Grid:
-        """Return what can be held; in old files hexahedra of any order have another order of nodes."""
+    def of(cls, content: Content, form: Format, old: bool) -> Grid:
+        """Return what can be held; in old files hexahedra of any order have another order of nodes.
+
+        Raises
+        ------
+        WriteError
+            Nothing can.
+        """
         numbers = [
             number_of(run.type) if isinstance(run.vertices, np.ndarray) and len(run.vertices) else None
             for run in content.cells
         ]
         kept = [(i, number) for i, number in enumerate(numbers) if number is not None]
+        if not kept:
+            raise content.refusal(form)
         vertices = []
         for i, number in kept:
             order = order_of(content.cells[i].type, number) if old else None

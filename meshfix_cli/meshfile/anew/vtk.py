@@ -27,7 +27,7 @@ _LONGEST = 200  # characters of a name: VTK reads lines of 255
 def written(content: Content, form: Format) -> bytes:
     """Return a file."""
     old = form.name == "vtk42"
-    return b"".join(_parts(Grid.of(content, old), old, form.binary is not False))
+    return b"".join(_parts(Grid.of(content, form, old), old, form.binary is not False))
 
 
 def _parts(grid: Grid, old: bool, binary: bool) -> Iterator[bytes]:

@@ -33,7 +33,7 @@ _COMPRESSED = ' compressor="vtkZLibDataCompressor"'
 
 def written(content: Content, form: Format) -> bytes:
     """Return a file."""
-    grid = Grid.of(content, old=True)
+    grid = Grid.of(content, form, old=True)
     text = form.binary is False
     arrays = _Arrays(text)
     kinds = grid.kinds()

@@ -25,13 +25,15 @@ _KINDS = {"f": "Float", "i": "Int", "u": "UInt"}
 _BY_COLUMNS = {1: "Scalar", 3: "Vector", 6: "Tensor6", 9: "Tensor"}
 
 
-def written(content: Content, _: Format) -> bytes:
+def written(content: Content, form: Format) -> bytes:
     """Return a file."""
-    return b"".join(_parts(content))
-
-
-def _parts(content: Content) -> Iterator[bytes]:
     kept = [i for i, run in enumerate(content.cells) if run.type in HEADS and len(run.vertices)]
+    if not kept:
+        raise content.refusal(form)
+    return b"".join(_parts(content, kept))
+
+
+def _parts(content: Content, kept: list[int]) -> Iterator[bytes]:
     point, cell, about = data_of(content, kept)
     points = np.asarray(content.points, dtype=np.float64)
     yield b'<?xml version="1.0"?>\n<Xdmf Version="3.0">\n<Domain>\n<Grid Name="mesh" GridType="Uniform">\n'

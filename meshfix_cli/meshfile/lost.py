@@ -86,22 +86,27 @@ def _numbers(source: Source, other: Source) -> Iterator[str]:
     """Name numbers that are others; those that tell no more than the order does are not lost."""
     nodes = numbers_of_nodes(source)
     if nodes is not None and not _are_order([nodes]):
-        theirs = numbers_of_nodes(other)
-        also = other.arrays.point.values()  # as VTK has them
-        if not any(np.array_equal(nodes, values) for values in (theirs, *also) if values is not None):
+        there = (numbers_of_nodes(other), *other.arrays.point.values())  # VTK has them as data
+        if not any(np.array_equal(nodes, values) for values in there if values is not None):
             yield "numbers of nodes"
-    runs = {run.type: run for run in other.cells}
-    pairs = [(numbers_of(run), runs[run.type]) for run in source.cells if run.type in runs and run.ids is not None]
-    if not _are_order([mine for mine, _ in pairs]) and not all(_has(run, mine) for mine, run in pairs):
+    mine, theirs = _by_type(source.cells), _by_type(other.cells)
+    pairs = [(numbers, theirs[key]) for key, numbers in mine.items() if key in theirs]
+    if not (_are_order([numbers for numbers, _ in pairs]) or all(_has(found, numbers) for numbers, found in pairs)):
         yield "numbers of elements"
 
 
-def _has(run: Cells, numbers: Int64) -> bool:
-    """Whether cells have such numbers, one for each."""
+def _by_type(cells: Sequence[Cells]) -> dict[str, Int64]:
+    """Return the numbers of the cells of each type."""
+    found: dict[str, list[Int64]] = {}
+    for run in cells:
+        found.setdefault(run.type, []).append(numbers_of(run))
+    return {key: np.concatenate(parts) for key, parts in found.items()}
+
+
+def _has(there: Int64, numbers: Int64) -> bool:
+    """Whether cells that are there have such numbers, where these are some."""
     some = numbers != NO_NUMBER
-    if run.ids is None or len(run.ids) != len(numbers):
-        return not some.any()
-    return np.array_equal(run.ids[some], numbers[some])
+    return len(there) == len(numbers) and np.array_equal(there[some], numbers[some])
 
 
 def _are_order(runs: Sequence[Int64]) -> bool:

@@ -16,7 +16,7 @@ from programs import gmsh_session
 
 from meshfix_cli import write
 from meshfix_cli.meshfile.recognise import Format
-from meshfix_cli.meshfile.source import Cells
+from meshfix_cli.meshfile.source import Arrays, Cells
 
 GMSH = [Format(name, binary) for name in ("gmsh22", "gmsh") for binary in (False, True)]
 NUMBERED = [*GMSH, Format("abaqus"), Format("nastran"), Format("exodus")]
@@ -89,8 +89,10 @@ def test_the_largest_numbers_are_kept_and_larger_ones_are_not(form: Format, tmp_
     assert {*elements_of(back).values()} == {most, 2, 9, 4}
     back, dropped = written(box([most + 1, 5, 7, 3, 1], [most, 2], [9, 4]), form, tmp_path / "out")
     assert dropped == ("numbers of nodes",) and {*elements_of(back).values()} == {most, 2, 9, 4}
-    back, dropped = written(box([4, 5, 7, 3, 2**40], [2**40, 2], [9, 4]), form, tmp_path / "out")
-    assert dropped == BOTH and sorted(elements_of(back).values()) == [1, 2, 3, 4]
+    assert [*nodes_of(back).values()] == [8, 5, 7, 3, 1]
+    back, dropped = written(box([most, 5, 7, 3, 2**40], [2**40, 2], [9, 4]), form, tmp_path / "out")
+    assert dropped == BOTH and sorted(elements_of(back).values()) == [2, 4, 9, 10]
+    assert [*nodes_of(back).values()] == [most, 5, 7, 3, 1]  # there is no larger one
 
 
 @pytest.mark.parametrize("form", [*NUMBERED, Format("vtu"), Format("medit"), Format("su2")])
@@ -107,13 +109,17 @@ def test_numbers_that_only_count_are_not_missed(name: str, form: Format, tmp_pat
 
 
 @pytest.mark.parametrize("form", NUMBERED)
-@pytest.mark.parametrize(
-    ("nodes", "ids"), [([1, 2, 3, 3, 4], [[1, 2], [2, 3]]), ([0, 2, 3, 4, 9], [[-5, 2], [7, 3]])], ids=["twice", "zero"]
-)
-def test_numbers_that_no_file_may_have_are_new(nodes: Any, ids: Any, form: Format, tmp_path: Path) -> None:
-    back, dropped = written(box(nodes, *ids), form, tmp_path / "out")
+def test_of_a_number_that_stands_twice_the_solid_keeps_it(form: Format, tmp_path: Path) -> None:
+    """As the elements of several parts of Abaqus, or a rigid element of Nastran, whose bars have its number."""
+    source = box([9, 2, 3, 3, -4], [3, 2], [2, 7])
+    source = replace(source, cells=source.cells[::-1])
+    back, dropped = written(source, form, tmp_path / "out")
     assert dropped == BOTH
-    assert sorted(elements_of(back).values()) == [1, 2, 3, 4]
+    assert [*nodes_of(back).values()] == [9, 2, 3, 10, 11]
+    numbers: dict[str, list[int]] = {}
+    for (key, *_), number in elements_of(back).items():
+        numbers[key] = sorted([*numbers.get(key, []), number])
+    assert numbers == {"tetra": [2, 3], "triangle": [7, 8]}
 
 
 @pytest.mark.parametrize("form", NUMBERED)
@@ -123,6 +129,15 @@ def test_cells_without_numbers_come_behind_those_that_have_some(form: Format, tm
     back, dropped = written(more, form, tmp_path / "out")
     assert dropped == ()
     assert sorted(elements_of(back).values()) == [10, 20, 21, 22, 23]
+
+
+@pytest.mark.parametrize("form", NUMBERED)
+def test_numbers_that_ascend_in_each_type_are_not_missed(form: Format, tmp_path: Path) -> None:
+    """Also where a file has elements of one type in several places."""
+    labels = Arrays(cell={"material": [np.array([1, 2]), np.array([1, 1])]})
+    source = replace(box([1, 3, 5, 7, 9], [10, 20], [4, 30], arrays=labels), regions=("material",))
+    _, dropped = written(source, form, tmp_path / "out")
+    assert not {*BOTH} & {*dropped}
 
 
 @pytest.mark.parametrize("form", [Format("vtu"), Format("vtk"), Format("medit"), Format("su2"), Format("xdmf")])

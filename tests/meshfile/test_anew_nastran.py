@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from elements import MESHES
 from named_groups import named, written_as
+from programs import gmsh_session
 from refined import SERENDIPITY, refined
 
 from meshfix_cli import read, write
@@ -82,6 +83,16 @@ def test_constraints_keep_their_numbers(tmp_path: Path) -> None:
         "SPC 7": list(range(13)), "SPC 8": [2, 5],
     }  # fmt: skip
     assert len(re.findall(r"(?m)^SPC1 ", (tmp_path / "out.bdf").read_text())) == 4
+
+
+def test_gmsh_reads_wedges_beside_constraints(tmp_path: Path) -> None:
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]])
+    arrays = Arrays(point_sets={"SPC 1": np.array([0, 2])})
+    source = Source(points, [Cells("wedge", np.arange(6)[None])], load=lambda: arrays)
+    written_as(source, FORM, tmp_path / "out.bdf")
+    with gmsh_session() as gmsh:
+        gmsh.open(str(tmp_path / "out.bdf"))
+        assert gmsh.model.mesh.getElements()[2][0].tolist() == [1, 2, 3, 4, 5, 6]
 
 
 @pytest.mark.parametrize("form", [Format("gmsh22", True), Format("vtu", True), Format("medit"), Format("abaqus")])

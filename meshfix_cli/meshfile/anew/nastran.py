@@ -33,13 +33,13 @@ def written(content: Content, _: Format) -> bytes:
     kept = [i for i, run in enumerate(content.cells) if run.type in HELD and len(run.vertices)]
     if max(len(content.points), sum(len(content.cells[i].vertices) for i in kept)) > MOST:
         raise WriteError("cannot be written as nastran: numbers have 8 digits, and there are too many")
-    parts = [b"CEND\nBEGIN BULK\n", _points(content)]
+    # gmsh takes what stands behind a wedge for more nodes of it, but for other elements.
+    parts = [b"CEND\nBEGIN BULK\n", _points(content), *_constraints(content)]
     for i, properties in zip(kept, _properties(content, kept), strict=True):
         run = content.cells[i]
         order = np.argsort(ORDER[run.type]) if run.type in ORDER else slice(None)
         table = np.column_stack([content.elements[i], properties, content.nodes_of(run.vertices[:, order])])
         parts.append(in_columns(f"{HELD[run.type]:8}", table, 8, 8, "+       "))
-    parts += _constraints(content)
     return b"".join([*parts, b"ENDDATA\n"])
 
 

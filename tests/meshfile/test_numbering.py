@@ -13,8 +13,9 @@ import pytest
 from laden import box, document_of, elements_of, laden, nodes_of, places, with_numbers, written
 from named_groups import named
 from programs import gmsh_session
+from splicing import MODULES, make
 
-from meshfix_cli import write
+from meshfix_cli import read, write
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Arrays, Cells
 
@@ -146,3 +147,19 @@ def test_formats_without_numbers_lose_them(form: Format, tmp_path: Path) -> None
     assert dropped == ("numbers of nodes",)
     _, dropped = written(box([1, 2, 3, 4, 5], [1, 2], [4, 3]), form, tmp_path / "out")
     assert dropped == ("numbers of elements",)
+
+
+@pytest.mark.parametrize(
+    "reader", ["abaqus", "adcirc", "avsucd", "febio", "gambit", "getfem", "gmsh", "lsdyna", "mapdl", "mdpa",
+               "nastran", "unv"],
+)  # fmt: skip
+def test_files_of_other_programs_have_numbers(reader: str, tmp_path: Path) -> None:
+    """Of all points; gmsh has them all, or their loss is named, but for places, which begin with 0."""
+    document = read(make(reader, next(iter(MODULES[reader].FILES)), tmp_path))
+    numbers = document.source.numbers()
+    assert numbers is not None and len(numbers) == len(document.source.points)
+    _, dropped = write(document, document.mesh, tmp_path / "converted.msh", Format("gmsh", True))
+    found = read(tmp_path / "converted.msh").source.numbers()
+    assert found is not None
+    counts = np.array_equal(numbers, numbers[0] + np.arange(len(numbers)))
+    assert np.array_equal(found, numbers) or "numbers of nodes" in dropped or (counts and numbers[0] == 0)

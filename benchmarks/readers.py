@@ -1,8 +1,9 @@
-"""CPU seconds to read a mesh, by format: `make bench`, or `python benchmarks/readers.py [--tets N] [FORMAT...]`.
+"""CPU seconds to read and to write a mesh: `make bench`, or `python benchmarks/readers.py [--tets N] [FORMAT...]`.
 
 The same tetrahedra stand in files of each format, written here. What is measured is all that a reader does: points,
-cells, and where the coordinates stand. Formats are read in turns; the least of several runs, and how many times that of
-the text of VTK it is.
+cells, and where the coordinates stand; and all that it takes to write the mesh after each free vertex has moved, which
+is most of them. Formats are read and written in turns; the least of several runs, and how many times that of the text
+of VTK reading is.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from rich.console import Console
 from rich.table import Table
 
 from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.reading import parse
+from meshfix_cli.meshfile.reading import parse, read
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.source import Source
+from meshfix_cli.meshfile.writing import write
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "sample_meshes"))
 import generate
@@ -124,10 +126,10 @@ FORMATS: dict[str, tuple[str, Callable[[Path, Points, Tets], None]]] = {
 }
 
 
-def cpu(read: Callable[[], Source]) -> float:
+def cpu(work: Callable[[], object]) -> float:
     """Return the CPU seconds of one call."""
     start = time.process_time()
-    read()
+    work()
     return time.process_time() - start
 
 
@@ -136,9 +138,18 @@ def reader(form: str, path: Path) -> Callable[[], Source]:
     return lambda: parse(b"" if path.is_dir() else path.read_bytes(), Format(form), path)
 
 
-def least(reads: Iterable[Callable[[], Source]], repeats: int) -> list[float]:
+def writer(form: str, path: Path) -> Callable[[], object]:
+    """Return what writes a mesh whose free vertices have all moved, beside the file or folder it was read from."""
+    document = read(path, form=form)
+    mesh = document.mesh
+    moved = mesh.with_points(mesh.points + 1e-3 * mesh.movable[:, None] * np.sin(mesh.points[:, ::-1]))
+    target = path.with_name(f"moved {path.name}")
+    return lambda: write(document, moved, str(target), document.format)
+
+
+def least(works: Iterable[Callable[[], object]], repeats: int) -> list[float]:
     """Return the least CPU seconds of each, measured in turns."""
-    return np.min([[cpu(read) for read in reads] for _ in range(repeats)], axis=0).tolist()
+    return np.min([[cpu(work) for work in works] for _ in range(repeats)], axis=0).tolist()
 
 
 def main() -> None:
@@ -152,19 +163,20 @@ def main() -> None:
     points, tets = generate.bracket(math.sqrt(layers / (29600 / 1e6 * options.tets)), layers)
     chosen = ["VTK", *(name for name in options.formats or FORMATS if name != "VTK")]
     with tempfile.TemporaryDirectory() as folder:
-        reads = []
+        reads, writes = [], []
         for name in chosen:
-            form, write = FORMATS[name]
+            form, make = FORMATS[name]
             path = Path(folder) / name
-            write(path, points, tets)
+            make(path, points, tets)
             source = parse(b"" if path.is_dir() else path.read_bytes(), Format(form), path)
             assert np.allclose(source.points, points, atol=1e-5)
             assert sum(len(run.vertices) for run in source.cells) == len(tets)
             reads.append(reader(form, path))
-        seconds = least(reads, options.repeats)
-    table = Table("format", "CPU seconds", "times VTK", title=f"to read {len(tets):,} tets")
-    for name, one in zip(chosen, seconds, strict=True):
-        table.add_row(name, f"{one:.3f}", f"{one / seconds[0]:.2f}")
+            writes.append(writer(form, path))
+        reading, writing = least(reads, options.repeats), least(writes, options.repeats)
+    table = Table("format", "to read [s]", "times VTK", "to write [s]", title=f"CPU for {len(tets):,} tets")
+    for name, one, other in zip(chosen, reading, writing, strict=True):
+        table.add_row(name, f"{one:.3f}", f"{one / reading[0]:.2f}", f"{other:.3f}")
     Console(width=100).print(table)
 
 

@@ -378,74 +378,86 @@ void append_shortest(std::string& text, Real value, int longest) {
     }
 }
 
-// The number whose digits and exponent stand in the text of a number, "-d.ddde+xx", with a point, as Fortran and Nastran
-// tell reals by, and no more than it takes.
-inline std::string as_field(std::string_view scientific, bool letter) {
-    const std::size_t e = scientific.find('e');
-    const bool minus = scientific[0] == '-';
-    std::string digits;
-    for (const char c : scientific.substr(0, e))
-        if (c >= '0' && c <= '9') digits += c;
-    while (digits.size() > 1 && digits.back() == '0') digits.pop_back();
-    int exponent = 0;
-    const std::string_view power = without_plus(scientific.substr(e + 1));
-    std::from_chars(power.data(), power.data() + power.size(), exponent);
-    const std::string sign = minus ? "-" : "";
-    const std::string sign_of_power = exponent < 0 ? "-" : letter ? "" : "+";
-    std::string with_power = sign + digits.substr(0, 1) + "." + digits.substr(1) + (letter ? "e" : "") + sign_of_power +
-                             std::to_string(std::abs(exponent));
-    const int size = static_cast<int>(digits.size());
-    if (exponent < -20 || exponent > 20) return with_power;
-    std::string plain = sign;
-    if (exponent < 0) {
-        plain += "." + std::string(-exponent - 1, '0') + digits;
-    } else if (exponent + 1 < size) {
-        plain += digits.substr(0, exponent + 1) + "." + digits.substr(exponent + 1);
-    } else {
-        plain += digits + std::string(exponent + 1 - size, '0') + ".";
-    }
-    return plain.size() <= with_power.size() ? plain : with_power;
-}
-
-// How many digits it takes to read back to the value.
-inline int digits_of(double value) {
-#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
-    char buffer[40];
-    const char* const end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::scientific).ptr;
-    int digits = 0;
-    for (const char* c = buffer; c < end && *c != 'e'; ++c) digits += *c >= '0' && *c <= '9';
-#else
-    std::string shortest;
-    append_shortest(shortest, value, 0);
-    int digits = 0;
-    for (const char c : std::string_view(shortest).substr(0, shortest.find('e')))
-        digits += c >= '0' && c <= '9' && (digits > 0 || c != '0');
-#endif
-    return std::max(digits, 1);
-}
-
-// Writes a number as "-d.ddde+xx", with so many digits; returns what is written.
+// Writes a number as "-d.ddde+xx", with so many digits, or as few as read back to it (0); returns what is written.
 inline std::string_view write_scientific(char (&buffer)[40], double value, int digits) {
 #if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
-    const char* const end = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::scientific, digits - 1).ptr;
+    constexpr auto form = std::chars_format::scientific;
+    const char* const end = digits > 0 ? std::to_chars(buffer, buffer + sizeof buffer, value, form, digits - 1).ptr
+                                       : std::to_chars(buffer, buffer + sizeof buffer, value, form).ptr;
     return {buffer, static_cast<std::size_t>(end - buffer)};
 #else
-    return {buffer, static_cast<std::size_t>(std::snprintf(buffer, sizeof buffer, "%.*e", digits - 1, value))};
+    double back{};
+    for (int some = digits > 0 ? digits : 1;; ++some) {
+        const auto size = std::snprintf(buffer, sizeof buffer, "%.*e", some - 1, value);
+        const std::string_view text(buffer, static_cast<std::size_t>(size));
+        if (digits > 0 || some == 17 || (read_number_slowly(text, back) && back == value)) return text;
+    }
 #endif
 }
+
+// A number as a field shows it: ".ddd", "dd.dd" or "d.dde-xx", always with a point, as Fortran and Nastran tell reals by.
+struct Decimal {
+    bool minus = false;
+    int count = 0;  // of its digits; the last is no 0, but where it is the only one
+    int exponent = 0;
+    char digits[20] = {};
+
+    explicit Decimal(std::string_view scientific) : minus(scientific[0] == '-') {
+        const std::size_t e = scientific.find('e');
+        for (const char c : scientific.substr(0, e))
+            if (c >= '0' && c <= '9') digits[count++] = c;
+        while (count > 1 && digits[count - 1] == '0') --count;
+        const std::string_view power = without_plus(scientific.substr(e + 1));
+        std::from_chars(power.data(), power.data() + power.size(), exponent);
+    }
+
+    int size(bool letter) const { return minus + (plainly(letter) ? plain_size() : size_with_power(letter)); }
+
+    void append(std::string& text, bool letter) const {
+        if (minus) text += '-';
+        if (!plainly(letter)) {
+            text += digits[0];
+            text += '.';
+            text.append(digits + 1, count - 1);
+            if (letter) text += 'e';
+            if (exponent < 0 || !letter) text += exponent < 0 ? '-' : '+';
+            text += std::to_string(std::abs(exponent));
+        } else if (exponent < 0) {
+            text += '.';
+            text.append(-exponent - 1, '0');
+            text.append(digits, count);
+        } else {
+            const int whole = std::min(exponent + 1, count);
+            text.append(digits, whole);
+            text.append(exponent + 1 - whole, '0');
+            text += '.';
+            text.append(digits + whole, count - whole);
+        }
+    }
+
+  private:
+    bool plainly(bool letter) const {
+        return exponent >= -20 && exponent <= 20 && plain_size() <= size_with_power(letter);
+    }
+    int plain_size() const { return exponent < 0 ? count - exponent : std::max(count, exponent + 1) + 1; }
+    int size_with_power(bool letter) const {
+        const int power = std::abs(exponent);
+        return count + 1 + letter + (exponent < 0 || !letter) + 1 + (power > 9) + (power > 99);
+    }
+};
 
 // Appends the number with as many digits as a field of so many columns holds, at most those that it takes to read back,
 // if `padded` behind blanks that fill it. In few columns the exponent has no letter, which Nastran knows as well.
 inline void append_field(std::string& text, double value, int columns, bool padded) {
-    std::string field;
-    for (int digits = std::min(digits_of(value), columns - 1); digits > 0; --digits) {
-        char buffer[40];
-        field = as_field(write_scientific(buffer, value, digits), columns > 10);
-        if (static_cast<int>(field.size()) <= columns) break;
+    const bool letter = columns > 10;
+    char buffer[40];
+    Decimal field(write_scientific(buffer, value, 0));
+    while (field.size(letter) > columns && field.count > 1) {  // a digit less is a character less, or none
+        const int digits = field.count - std::min(field.size(letter) - columns, field.count - 1);
+        field = Decimal(write_scientific(buffer, value, digits));
     }
-    const int missing = columns - static_cast<int>(field.size());
-    if (padded && missing > 0) text.append(missing, ' ');
-    text += field;
+    if (padded) text.append(std::max(columns - field.size(letter), 0), ' ');
+    field.append(text, letter);
 }
 
 }  // namespace meshfix

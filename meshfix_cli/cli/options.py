@@ -16,7 +16,7 @@ from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
 from meshfix_cli.repair import CURVINGS, MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.strategies import FEATURE_ANGLE, MOST_PASSES, SMOOTH, STRATEGIES, THRESHOLD
+from meshfix_cli.solve.strategies import FEATURE_ANGLE, RANGES, SMOOTH, STRATEGIES, THRESHOLD
 
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
@@ -81,7 +81,7 @@ class _Requirement(click.ParamType):  # type: ignore[type-arg]
             self.fail(str(error), param, ctx)
 
 
-LENGTH, PERCENT = _Distance(), _Range(0, 100)
+LENGTH, PERCENT = _Distance(), _Range(*RANGES["percent"])
 
 
 def _metrics() -> tuple[str, ...]:
@@ -237,7 +237,7 @@ reporting = packed(
     *_SHOW,
     click.option(
         "--threads",
-        type=click.IntRange(1, 1024),
+        type=click.IntRange(*RANGES["threads"]),
         default=cores,
         help="Default: the cores this process may use; 1 with --mpi.",
     ),
@@ -289,7 +289,7 @@ _SLIDE = (
     ),
     click.option(
         "--feature-angle",
-        type=_Range(0, 180),
+        type=_Range(*RANGES["feature_angle"]),
         default=FEATURE_ANGLE,
         show_default=True,
         metavar="DEGREES",
@@ -308,12 +308,12 @@ solving = packed(
     ),
     click.option(
         "--sweeps",
-        type=click.IntRange(0),
+        type=click.IntRange(*RANGES["sweeps"]),
         help="Untangling sweeps at most, all phases together. [default: as each needs]",
     ),
     click.option(
         "--smooth",
-        type=_Passes(0, MOST_PASSES),
+        type=_Passes(*RANGES["smooth"]),
         metavar="PASSES|auto|best",
         default=SMOOTH,
         show_default=True,
@@ -322,7 +322,7 @@ solving = packed(
     ),
     click.option(
         "--threshold",
-        type=_Range(0, 90),
+        type=_Range(*RANGES["threshold"]),
         metavar="DEGREES",
         help="Optimise stars with smaller angles or, of elements that are not simplices, scaled Jacobians below its "
         f"sine. [default: {THRESHOLD[2]:g} for plane meshes, {THRESHOLD[3]:g} for solids]",

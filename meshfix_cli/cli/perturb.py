@@ -10,6 +10,7 @@ from meshfix_cli.cli.files import open_files, report_stream
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, sliding, writing
 from meshfix_cli.repair import Files, Held, Method, tangled
 from meshfix_cli.solve.perturb import Distance
+from meshfix_cli.solve.strategies import RANGES
 
 
 @click.command(short_help="Tangle a mesh: move some interior vertices at random.")
@@ -18,7 +19,7 @@ from meshfix_cli.solve.perturb import Distance
 @click.option("--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")
 @click.option("--boundary", is_flag=True, help="The same as --slide flat.")
 @sliding
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(*RANGES["seed"]), default=0, show_default=True)
 @drawing
 @holding
 @reporting

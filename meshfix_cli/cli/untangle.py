@@ -28,6 +28,7 @@ from meshfix_cli.cli.options import (
 from meshfix_cli.cli.process import INVERTED, VALID, processes
 from meshfix_cli.errors import naming
 from meshfix_cli.repair import Files, Held, Method, repair
+from meshfix_cli.solve.strategies import senseless_beside_reference
 
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
@@ -128,6 +129,5 @@ def _check_reference(option: str, reference: str | None, method: Method) -> None
     """Refuse what makes no sense with a reference, which an option gives."""
     if reference == "-":
         raise click.UsageError("--reference is a file: stdin is INPUT's")
-    others = {"--only-invalid": method.only_invalid, "--threshold": method.threshold is not None}
-    for other in (name for name, is_given in others.items() if is_given):
-        raise click.UsageError(f"{option} and {other} exclude each other")
+    for other in senseless_beside_reference(method.only_invalid, method.threshold):
+        raise click.UsageError(f"{option} and --{other.replace('_', '-')} exclude each other")

@@ -75,15 +75,16 @@ class Mesh:
         cells : (m, d+1) int, or sequence of (str, (k, nodes) int)
             Simplices, or elements by their types, such as ("hexahedron", ...), which are numbered in this order.
             Numbered either way round; see `Topology.flipped`.
-        fixed : (n,) bool, optional
-            Vertices that must not move, beside those of the boundary.
+        fixed : (n,) bool or (k,) int, optional
+            Vertices that must not move, beside those of the boundary: a mask, or their indices.
         threads : int
 
         Raises
         ------
         InvalidMeshError
             Wrong shapes, no elements, indices out of range, coordinates that are not finite or too large,
-            an element that names a vertex twice; but for surfaces, a facet of more than two elements, a Moebius band.
+            an element that names a vertex twice; but for surfaces, a facet of more than two elements, a Moebius band;
+            `fixed` is neither a mask nor indices.
         """
         p = np.array(points, dtype=np.float64, order="C")
         blocks = _blocks_of(cells)
@@ -101,7 +102,7 @@ class Mesh:
             topology = build_mixed(p, checked, used, threads)
         movable = topology.used & ~topology.boundary
         if fixed is not None:
-            movable &= ~np.asarray(fixed, dtype=bool)
+            movable &= ~mask_of(fixed, len(p))
         mesh = cls(read_only(p), topology, read_only(movable))
         if p.shape[1] == topology.dimension:
             return mesh
@@ -258,6 +259,32 @@ class Mesh:
         following = np.where(following < 0, facets[:, :1], following)
         start, end = facets[facets >= 0], following[facets >= 0]
         return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
+
+
+def mask_of(fixed: ArrayLike, n: int) -> NDArray[np.bool_]:
+    """Return the mask (n,) of some vertices, which a mask or their indices tell.
+
+    Raises
+    ------
+    InvalidMeshError
+        It is neither; numbers that are 0 or 1, one for each vertex, could be both.
+    """
+    given = np.asarray(fixed)
+    mask = np.zeros(n, dtype=bool)
+    if given.size == 0:  # of an empty list numpy makes numbers with a point
+        return mask
+    if given.dtype == bool and given.shape == mask.shape:
+        return given
+    if given.ndim != 1 or given.dtype.kind not in "iu":
+        what = f"an array of shape {given.shape} and type {given.dtype}"
+        raise InvalidMeshError(f"fixed is {what}, and neither a mask ({n},) of bool nor indices of vertices")
+    if len(given) == n > 2 and given.max() <= 1:
+        raise InvalidMeshError("fixed has a 0 or a 1 for each vertex: as a mask it is to be of bool")
+    outside = given[(given < 0) | (given >= n)]
+    if len(outside):
+        raise InvalidMeshError(f"fixed names vertex {outside[0]}, and there are those from 0 to {n - 1}")
+    mask[given] = True
+    return mask
 
 
 def _blocks_of(cells: Any) -> NDArray[Any] | list[tuple[str, Any]]:

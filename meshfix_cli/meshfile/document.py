@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
 from meshfix_cli.mesh.elements import counted, dimension_of
-from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh
+from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh, mask_of
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import first_of_each_place
 from meshfix_cli.meshfile.notes import concave, notes_on
@@ -234,6 +234,7 @@ def build(
     regions: str | None,
     join_points: bool = False,
     threads: int = 1,
+    fixed: ArrayLike | None = None,
 ) -> Document:
     """Make a document of what a file holds; the parameters are those of `read`."""
     solved = _solved(source)
@@ -249,6 +250,8 @@ def build(
         held["by the file"] = source.held
     named = {one: _fixed_by(source, one) for one in fix}
     held |= {f"by --fix {one}": mask for one, mask in named.items()}
+    if fixed is not None:
+        held["by fixed"] = mask_of(fixed, len(points))
     mesh = replace(Mesh.build(points, solved.blocks, threads=threads), apart=source.apart)
     arbitrary = None if source.oriented else mesh.topology.flipped
     if not source.oriented:  # the numbering says nothing

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from meshfix_cli.errors import MeshfixError, ReadError, naming
 from meshfix_cli.kernels import use_threads
@@ -31,6 +32,7 @@ def read(
     fix: str | Sequence[str] | None = None,
     regions: str | None = None,
     *,
+    fixed: ArrayLike | None = None,
     double: bool = False,
     fix_orientation: bool = False,
     join_points: bool = False,
@@ -49,6 +51,8 @@ def read(
     regions : str, optional
         Name of a cell-data array; the interface between regions is held. "none": none is. Default: those of
         `Source.regions`.
+    fixed : (n,) bool or (k,) int, optional
+        Points of the file, as a mask or by their indices from 0, that are held.
     double : bool
         Make coordinates in float32 those of a file in float64.
     fix_orientation : bool
@@ -72,7 +76,7 @@ def read(
     names = (fix,) if isinstance(fix, str) else tuple(fix or ())
 
     def built(source: Source, found: Format) -> Document:
-        return build(name, source, found, names, regions, join_points, threads)
+        return build(name, source, found, names, regions, join_points, threads, fixed)
 
     with naming(name):
         source, found = _open(None if streamed else Path(name), double, form, threads)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli.errors import InvalidMeshError, OptionError, naming
-from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.mesh import Mesh, mask_of
 from meshfix_cli.meshfile.displaced import displaced, places_in
 from meshfix_cli.meshfile.document import Document, build
+from meshfix_cli.meshfile.reading import read
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.objects.kinds import Kind, kind_of
 from meshfix_cli.objects.options import (
@@ -22,16 +23,22 @@ from meshfix_cli.objects.options import (
     Options,
     Perturbing,
     Solving,
+    array_of,
+    check_reference,
     held_of,
     judge_of,
     length_of,
     method_of,
+    percent_of,
+    seed_of,
+    threads_of,
 )
 from meshfix_cli.quality.summary import Summary, summarise
 from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair, tangled
 from meshfix_cli.report.sliding import sliding
 from meshfix_cli.solve.perturb import perturb as perturb_mesh
 from meshfix_cli.solve.records import Outcome, SweepRecord
+from meshfix_cli.solve.strategies import FEATURE_ANGLE
 from meshfix_cli.solve.untangle import untangle as untangle_mesh
 
 if TYPE_CHECKING:
@@ -144,6 +151,7 @@ def untangle(
     reference: Any = None,
     displace: str | None = None,
     fix: Names = (),
+    fixed: ArrayLike | None = None,
     regions: str | None = None,
     join_points: bool = False,
     require: Names = (),
@@ -165,6 +173,8 @@ def untangle(
         The same mesh before its boundary moved, of any of these kinds.
     displace : str, optional
         An array of point data, vectors by which points move first; the mesh as it came is the reference then.
+    fixed : (n,) bool or (k,) int, optional
+        Points that are held, as a mask or by their indices.
     fix, regions, join_points, require, metrics
         See `meshfix untangle --help`; metrics are those of `--metric`.
     threads : int
@@ -183,27 +193,28 @@ def untangle(
     MeshfixError
         `OptionError` for an option, else with the sentence that the command line has.
     """
-    method = method_of({"strategy": strategy, **options})
+    method, threads = method_of({"strategy": strategy, **options}), threads_of(threads)
+    held, judge = held_of(fix, regions, join_points), judge_of(metrics, require, threads)
+    for option, is_given in (("reference", reference is not None), ("displace", array_of("displace", displace))):
+        if is_given:
+            check_reference(option, method)
     if isinstance(mesh, Mesh):
-        _check_bare(fix or regions or join_points or displace or require or metrics, options)
-        return _of_mesh(mesh, method, reference, threads)
-    if method.only_invalid and (reference is not None or displace is not None):
-        raise OptionError("a reference and only_invalid exclude each other")
-    judge = judge_of(metrics, require, threads)
-    document, kind = _document(mesh, held_of(fix, regions, join_points), threads)
+        _check_bare(held != Held() or displace or require or metrics, options)
+        return _of_mesh(_with_fixed(mesh, fixed), method, reference, threads)
+    document, kind = _document(mesh, held, fixed, threads)
     moved = document if displace is None else displaced(document, displace)
     before = document if reference is None and displace is not None else reference
     places = None
     if before is not None:
         with naming(document.name):
-            places = places_in(_document(before, Held(join_points=join_points), threads)[0], moved, threads)
+            places = places_in(_document(before, Held(join_points=join_points), None, threads)[0], moved, threads)
     report = repair(moved, moved.format, Files(dry_run=True), method, judge, reference=places)
     return Result(report, moved, mesh, kind)
 
 
 @overload
 def perturb(  # type: ignore[overload-overlap]
-    mesh: Mesh, percent: float, dist: Length, seed: int = 0, *, threads: int = 1
+    mesh: Mesh, percent: float, dist: Length, seed: int = 0, *, fixed: ArrayLike | None = None, threads: int = 1
 ) -> tuple[Mesh, int]: ...
 @overload
 def perturb(mesh: File, percent: float, dist: Length, seed: int = 0, **options: Unpack[Perturbing]) -> Result[Mesh]: ...
@@ -216,7 +227,9 @@ def perturb(
     seed: int = 0,
     *,
     slide: Sliding = "none",
+    feature_angle: float = FEATURE_ANGLE,
     fix: Names = (),
+    fixed: ArrayLike | None = None,
     regions: str | None = None,
     join_points: bool = False,
     threads: int = 1,
@@ -232,7 +245,7 @@ def perturb(
     dist : float or str
         In model units, or a text such as "2h".
     seed : int
-    slide, fix, regions, join_points, threads
+    slide, feature_angle, fix, fixed, regions, join_points, threads
         See `untangle`.
 
     Returns
@@ -240,17 +253,18 @@ def perturb(
     Result
         Of a `Mesh` the moved mesh, and how many vertices have moved.
     """
-    length, method = length_of("dist", dist), method_of({"slide": slide})
-    if not 0 <= percent <= 100:
-        raise OptionError(f"percent is a number from 0 to 100, and not {percent!r}")
+    length, method = length_of("dist", dist), method_of({"slide": slide, "feature_angle": feature_angle})
+    percent, seed, threads = percent_of(percent), seed_of(seed), threads_of(threads)
+    held = held_of(fix, regions, join_points)
     if isinstance(mesh, Mesh):
-        _check_bare(fix or regions or join_points, {} if slide == "none" else {"slide": slide})
-        return perturb_mesh(mesh, percent, length.length(mesh, threads), seed)
-    document, kind = _document(mesh, held_of(fix, regions, join_points), threads)
+        _check_bare(held != Held(), {} if method == Method() else {"slide": slide})
+        return perturb_mesh(_with_fixed(mesh, fixed), percent, length.length(mesh, threads), seed)
+    document, kind = _document(mesh, held, fixed, threads)
     document = method.freed(document)
     moved, facts = tangled(document, percent, length, seed, threads)
     stages = {"before": document.mesh, "perturbed": document.as_stored(moved)}
-    return Result(Judge(threads=threads).report("perturb", document, stages, facts=facts), document, mesh, kind)
+    notes = method.without_effect(document.mesh)
+    return Result(Judge(threads=threads).report("perturb", document, stages, notes, facts=facts), document, mesh, kind)
 
 
 def quality(mesh: Any, metrics: Names = (), *, threads: int = 1) -> Summary:
@@ -264,10 +278,10 @@ def quality(mesh: Any, metrics: Names = (), *, threads: int = 1) -> Summary:
         Those of `--metric`.
     threads : int
     """
-    names = judge_of(metrics, (), threads).metrics
+    judge = judge_of(metrics, (), threads_of(threads))
     if not isinstance(mesh, Mesh):
-        mesh = as_surface(_document(mesh, Held(), threads)[0]).mesh
-    return summarise(mesh, names, threads)
+        mesh = as_surface(_document(mesh, Held(), None, judge.threads)[0]).mesh
+    return summarise(mesh, judge.metrics, judge.threads)
 
 
 class Repairer:
@@ -279,7 +293,7 @@ class Repairer:
         See `untangle`.
     towards : bool
         Elements get the shapes back that they have in it; it is valid then.
-    strategy, fix, regions, join_points, threads, options
+    strategy, fix, fixed, regions, join_points, threads, options
         See `untangle`.
 
     Attributes
@@ -295,18 +309,19 @@ class Repairer:
         *,
         towards: bool = False,
         fix: Names = (),
+        fixed: ArrayLike | None = None,
         regions: str | None = None,
         join_points: bool = False,
         threads: int = 1,
         **options: Unpack[Solving],
     ) -> None:
         self.outcome: Outcome | None = None
-        self._method, self._threads = method_of({"strategy": strategy, **options}), threads
-        self._document = _document(mesh, held_of(fix, regions, join_points), threads)[0]
+        self._method, self._threads = method_of({"strategy": strategy, **options}), threads_of(threads)
+        if towards:
+            check_reference("towards", self._method)
+        self._document = _document(mesh, held_of(fix, regions, join_points), fixed, threads)[0]
         self._places: NDArray[np.float64] | None = None
         if towards:
-            if self._method.only_invalid:
-                raise OptionError("towards and only_invalid exclude each other")
             with naming(self._document.name):
                 self._places = places_in(self._document, self._document, threads)
 
@@ -354,13 +369,21 @@ def _check_bare(given: object, options: Any) -> None:
         )
 
 
-def _document(mesh: Any, held: Held, threads: int) -> tuple[Document, Kind | None]:
+def _with_fixed(mesh: Mesh, fixed: ArrayLike | None) -> Mesh:
+    return mesh if fixed is None else mesh.with_fixed(mask_of(fixed, len(mesh.points)))
+
+
+def _document(mesh: Any, held: Held, fixed: ArrayLike | None, threads: int) -> tuple[Document, Kind | None]:
     """Return a document of a mesh, and what kind of object it is; None: a document or a path."""
     if isinstance(mesh, Document):
+        if fixed is not None or held != Held():
+            raise OptionError("a document has been read: give fix, fixed, regions and join_points to `read`")
         return mesh, None
     if isinstance(mesh, str | os.PathLike):
-        return held.read(os.fspath(mesh), threads), None
+        return read(mesh, held.fix, held.regions, fixed=fixed, join_points=held.join_points, threads=threads), None
     kind = kind_of(mesh)
+    if isinstance(mesh, Mesh):
+        fixed = ~_with_fixed(mesh, fixed).movable
     with naming(kind.name):
         source = kind.source(mesh)
-        return build(kind.name, source, _IN_MEMORY, held.fix, held.regions, held.join_points, threads), kind
+        return build(kind.name, source, _IN_MEMORY, held.fix, held.regions, held.join_points, threads, fixed), kind

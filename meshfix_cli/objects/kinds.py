@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, markings, runs, types_of_sizes
 
@@ -57,6 +58,8 @@ def kind_of(mesh: object) -> Kind:
         if cls.__name__ in ("vtkUnstructuredGrid", "vtkPolyData"):
             library = type(mesh).__module__.partition(".")[0]
             return Kind(f"{library}.{type(mesh).__name__}", _of_vtk, _moved_vtk)
+    if isinstance(mesh, Mesh):
+        return Kind("Mesh", _of_mesh, _moved_mesh)
     if isinstance(mesh, tuple | list) and len(mesh) == 2:
         return Kind("(points, cells)", _of_arrays, _moved_arrays)
     raise InvalidMeshError(
@@ -76,6 +79,14 @@ def _moved_meshio(mesh: Any, points: NDArray[np.floating[Any]]) -> Any:
     moved = mesh.copy()
     moved.points = points
     return moved
+
+
+def _of_mesh(mesh: Mesh) -> Source:
+    return Source(mesh.points, [Cells(block.element.key, block.vertices) for block in mesh.topology.blocks])
+
+
+def _moved_mesh(mesh: Mesh, points: NDArray[np.floating[Any]]) -> Mesh:
+    return mesh.with_points(points.astype(np.float64))
 
 
 def _of_arrays(mesh: Any) -> Source:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from numbers import Integral, Real
 from typing import Any, TypedDict
+
+from numpy.typing import ArrayLike
 
 from meshfix_cli.errors import OptionError
 from meshfix_cli.quality.metrics import METRICS
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.repair import CURVINGS, SLIDES, Curving, Held, Judge, Method, Sliding
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.strategies import STRATEGIES, Smooth
+from meshfix_cli.solve.strategies import RANGES, STRATEGIES, Smooth, senseless_beside_reference
 
 Length = float | str | Distance
 Names = str | Sequence[str]
@@ -35,6 +40,7 @@ class Holding(TypedDict, total=False):
     """What is held still, see `repair.Held`; and how many threads do the work."""
 
     fix: Names
+    fixed: ArrayLike | None
     regions: str | None
     join_points: bool
     threads: int
@@ -52,6 +58,7 @@ class Perturbing(Holding, total=False):
     """What `perturb` takes beside what the paper has."""
 
     slide: Sliding
+    feature_angle: float
 
 
 OF_DOCUMENTS = ("slide", "slide_interfaces", "feature_angle", "max_deviation", "curving")
@@ -71,20 +78,34 @@ def method_of(options: Mapping[str, Any]) -> Method:
     return Method(**{name: _READ[name](name, value) for name, value in options.items()})
 
 
+def check_reference(given: str, method: Method) -> None:
+    """Refuse what makes no sense with a reference, which an option gives."""
+    for other in senseless_beside_reference(method.only_invalid, method.threshold):
+        raise OptionError(f"{given} and {other} exclude each other")
+
+
 def held_of(fix: Names, regions: str | None, join_points: bool) -> Held:
     """Return what is held still."""
-    return Held(_names(fix), regions, join_points)
+    return Held(_names("fix", fix), array_of("regions", regions), _flag("join_points", join_points))
+
+
+def array_of(option: str, name: str | None) -> str | None:
+    """Return the name of an array."""
+    if name is not None and not isinstance(name, str):
+        raise OptionError(f"{option} is the name of an array, and not the array itself or anything else")
+    return name
 
 
 def judge_of(metrics: Names, require: Names, threads: int) -> Judge:
     """Return what is found out about a result."""
-    for name in _names(metrics):
+    asked = _names("metrics", metrics)
+    for name in asked:
         _one_of(METRICS)("metrics", name)
     try:
-        required = tuple(Requirement.parse(text) for text in _names(require))
+        required = tuple(Requirement.parse(text) for text in _names("require", require))
     except ValueError as error:
         raise OptionError(f"require: {error}") from error
-    return Judge(_names(metrics), required, threads)
+    return Judge(asked, required, threads)
 
 
 def length_of(name: str, value: object) -> Distance:
@@ -97,8 +118,12 @@ def length_of(name: str, value: object) -> Distance:
         ) from error
 
 
-def _names(names: Names) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names)
+def _names(option: str, names: Names) -> tuple[str, ...]:
+    several = [names] if isinstance(names, str) else names
+    if not isinstance(several, Sequence) or not all(isinstance(name, str) for name in several):
+        hint = ", which `fixed` takes" * (option == "fix")
+        raise OptionError(f"{option} is a text, or several, and no numbers{hint}")
+    return tuple(several)
 
 
 def _one_of(known: Iterable[str]) -> Callable[[str, Any], Any]:
@@ -112,18 +137,19 @@ def _one_of(known: Iterable[str]) -> Callable[[str, Any], Any]:
     return check
 
 
-def _within(first: float, last: float, whole: bool = False, none: bool = False, words: Sequence[str] = ()) -> Any:
+def _within(whole: bool = False, none: bool = False, words: Sequence[str] = ()) -> Any:
     """Return what checks a number; `none`: it may be None; `words`: what else it may be."""
 
     def check(name: str, value: Any) -> Any:
         if (none and value is None) or (isinstance(value, str) and value in words):
             return value
-        number = isinstance(value, int) or (not whole and isinstance(value, float))
-        if isinstance(value, bool) or not number or not first <= value <= last:
-            kind = "a whole number" if whole else "a number"
+        first, last = RANGES[name]
+        number = isinstance(value, Integral if whole else Real) and not isinstance(value, bool)
+        if not number or not first <= value <= (math.inf if last is None else last):
+            kind, end = "a whole number" if whole else "a number", "on" if last is None else f"to {last:,}"
             others = "".join(f", or {word!r}" for word in words)
-            raise OptionError(f"{name} is {kind} from {first:g} to {last:g}{others}, and not {value!r}")
-        return value
+            raise OptionError(f"{name} is {kind} from {first} {end}{others}, and not {value!r}")
+        return int(value) if whole else float(value)
 
     return check
 
@@ -134,16 +160,21 @@ def _flag(name: str, value: object) -> bool:
     return value
 
 
+# The numbers that are no part of a `Method`.
+percent_of, seed_of, threads_of = (
+    partial(_within(whole), name) for name, whole in (("percent", False), ("seed", True), ("threads", True))
+)
+
 _READ: dict[str, Callable[[str, Any], Any]] = {
     "strategy": _one_of(STRATEGIES),
-    "sweeps": _within(0, 1e9, whole=True, none=True),
-    "smooth": _within(0, 1e6, whole=True, words=("auto", "best")),
-    "threshold": _within(0, 90, none=True),
+    "sweeps": _within(whole=True, none=True),
+    "smooth": _within(whole=True, words=("auto", "best")),
+    "threshold": _within(none=True),
     "max_move": lambda name, value: None if value is None else length_of(name, value),
     "only_invalid": _flag,
     "slide": _one_of(SLIDES),
     "slide_interfaces": _flag,
-    "feature_angle": _within(0, 180),
+    "feature_angle": _within(),
     "max_deviation": length_of,
     "curving": _one_of(CURVINGS),
 }

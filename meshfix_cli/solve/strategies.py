@@ -20,6 +20,16 @@ FEATURE_ANGLE, MAX_DEVIATION = 40.0, 0.03  # degrees, and mean edge lengths: see
 ROUNDS = 8  # of "best", at most, after the first
 TURNS, RATIO_SWEEPS = 4, 6  # of "best" where elements are not all simplices
 MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold
+# From where to where the numbers of options go, of the command line and of Python; None: there is no end.
+RANGES: dict[str, tuple[int, int | None]] = {
+    "sweeps": (0, None),
+    "smooth": (0, MOST_PASSES),
+    "threshold": (0, 90),
+    "feature_angle": (0, 180),
+    "percent": (0, 100),
+    "seed": (0, None),
+    "threads": (1, 1024),
+}
 RINGS = (4,)  # around inverted elements in which the work begins
 REGIONS = (0, 2, 4, 8, None)  # rings around inverted elements that sweeps take in, where only those may move
 
@@ -186,6 +196,12 @@ _RATIOS = Phase(
 )
 _SHARP = replace(_SHAPE, compares=True, elements=True, shapes="sharp")
 _TURNS = (_RATIOS, *(_SHARP, _RATIOS) * TURNS)
+
+
+def senseless_beside_reference(only_invalid: bool, threshold: float | None) -> tuple[str, ...]:
+    """Return the names of options that are given and mean nothing where elements get the shapes of a reference."""
+    given = {"only_invalid": only_invalid, "threshold": threshold is not None}
+    return tuple(name for name, is_given in given.items() if is_given)
 
 
 def plan(

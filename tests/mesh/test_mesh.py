@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
+from typing import Any
 
 import generate
 import numpy as np
@@ -230,3 +232,27 @@ def test_repetitions_are_found_in_all_blocks_of_a_type() -> None:
     )
     assert mesh.topology.source.tolist() == [0, 1, 2]
     assert [block.vertices.tolist() for block in mesh.topology.blocks] == [triangles, quad]
+
+
+def test_vertices_are_fixed_by_a_mask_or_by_their_indices(bracket: Mesh) -> None:
+    cells, n = bracket.topology.simplices, len(bracket.points)
+    free = np.flatnonzero(bracket.movable)
+    mask = np.isin(np.arange(n), free[:9])
+    for fixed in (mask, mask.tolist(), free[:9], free[:9].tolist(), [*free[:9], free[0]]):
+        np.testing.assert_array_equal(Mesh.build(bracket.points, cells, fixed).movable, bracket.movable & ~mask)
+    for nothing in (np.array([]), np.zeros(n, dtype=bool), None):
+        np.testing.assert_array_equal(Mesh.build(bracket.points, cells, nothing).movable, bracket.movable)
+
+
+@pytest.mark.parametrize(("fixed", "words"), [
+    (lambda n: [n], "names vertex 1863, and there are those from 0 to 1862"),
+    (lambda n: [0, -1], "names vertex -1"),
+    (lambda n: np.ones(n - 1, dtype=bool), r"shape \(1862,\) and type bool, and neither a mask \(1863,\) of bool"),
+    (lambda n: np.ones(n, dtype=np.uint8), "a 0 or a 1 for each vertex: as a mask it is to be of bool"),
+    (lambda n: np.zeros((2, 2), dtype=int), r"shape \(2, 2\) and type int64"),
+    (lambda n: [0.5], "nor indices of vertices"),
+])  # fmt: skip
+def test_what_does_not_tell_vertices_is_one_sentence(bracket: Mesh, fixed: Callable[[int], Any], words: str) -> None:
+    with pytest.raises(InvalidMeshError, match=words) as caught:
+        Mesh.build(bracket.points, bracket.topology.simplices, fixed(len(bracket.points)))
+    assert "\n" not in str(caught.value)

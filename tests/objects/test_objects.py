@@ -159,14 +159,22 @@ def test_options_are_those_of_the_command_line(tmp_path: Path) -> None:
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "unknown": ({"smoth": 3}, "there is no option 'smoth'; there are strategy, sweeps, smooth"),
     "strategy": ({"strategy": "XX"}, "strategy is one of auto, LS, US"),
-    "smooth": ({"smooth": "worst"}, "from 0 to 1e.06, or 'auto', or 'best', and not 'worst'"),
-    "sweeps": ({"sweeps": 1.5}, "sweeps is a whole number"),
+    "smooth": ({"smooth": "worst"}, "from 0 to 1,000,000, or 'auto', or 'best', and not 'worst'"),
+    "sweeps": ({"sweeps": 1.5}, "sweeps is a whole number from 0 on"),
+    "threads": ({"threads": 0}, "threads is a whole number from 1 to 1,024, and not 0"),
     "threshold": ({"threshold": float("nan")}, "threshold is a number from 0 to 90, and not nan"),
     "length": ({"max_move": "2k"}, "max_move is neither a length"),
     "flag": ({"only_invalid": 1}, "only_invalid is True or False"),
     "metric": ({"metrics": "beauty"}, "metrics is one of"),
     "require": ({"require": "min_angle > much"}, "require: 'much' is not a number"),
-    "both": ({"only_invalid": True, "displace": "u"}, "exclude each other"),
+    "invalid and displaced": ({"only_invalid": True, "displace": "u"}, "displace and only_invalid exclude each other"),
+    "threshold and reference": ({"threshold": 9, "reference": TETS}, "reference and threshold exclude each other"),
+    "not a name": ({"fix": [1, 2]}, "fix is a text, or several, and no numbers, which `fixed` takes"),
+    "not a name of an array": ({"displace": np.zeros(3)}, "displace is the name of an array, and not the array itself"),
+    "regions": ({"regions": 3}, "regions is the name of an array"),
+    "flag of points": ({"join_points": "no"}, "join_points is True or False"),
+    "fixed": ({"fixed": [2000]}, "meshio.Mesh: fixed names vertex 2000, and there are those from 0 to 1862"),
+    "fixed by numbers": ({"fixed": [0.5]}, r"fixed is an array of shape \(1,\) and type float64, and neither a mask"),
     "fix": ({"fix": "wall"}, "meshio.Mesh: there is no point data, set or group named 'wall'"),
     "displace": ({"displace": "u"}, "meshio.Mesh: there is no vector for each point named 'u'"),
 }
@@ -201,6 +209,47 @@ def test_a_bare_mesh_has_no_names() -> None:
     for options in ({"slide": "flat"}, {"fix": "a"}, {"require": "min_angle > 1"}):
         with pytest.raises(OptionError, match="give the document"):
             untangle(mesh, **options)  # type: ignore[call-overload]
+
+
+def test_what_a_document_holds_is_told_where_it_is_read() -> None:
+    document = read(TETS, fixed=[3])
+    for options in ({"fix": "a"}, {"fixed": [3]}, {"regions": "none"}, {"join_points": True}):
+        with pytest.raises(OptionError, match="give fix, fixed, regions and join_points to `read`"):
+            untangle(document, **options)
+
+
+@pytest.mark.parametrize("kind", [*MAKERS, "path", "Mesh"])
+def test_vertices_are_held_by_a_mask_or_by_their_indices(kind: str) -> None:
+    given = TETS if kind == "path" else read(TETS).mesh if kind == "Mesh" else MAKERS[kind](TETS)
+    before = read(TETS).mesh
+    indices = np.flatnonzero(before.movable)[5:900:100]
+    mask = np.isin(np.arange(len(before.points)), indices)
+    for fixed in (indices, indices.tolist(), mask, [*indices, indices[0]]):
+        result = untangle(given, fixed=fixed)
+        after = result.after.points
+        np.testing.assert_array_equal(after[indices], before.points[indices])
+        assert (after != before.points).any(axis=1).sum() > 100
+        if kind != "Mesh":
+            assert result.document.fixed["by fixed"] == len(indices)
+    moved = perturb(given, 100, "h", fixed=indices)
+    points = moved[0].points if isinstance(moved, tuple) else moved.points
+    np.testing.assert_array_equal(points[indices], before.points[indices])
+
+
+def test_vertices_that_are_held_do_not_slide() -> None:
+    shell = pyvista.read(SHELL)
+    which = np.flatnonzero(read(SHELL).mesh.movable)[::7]
+    for slide in ("none", "curved"):
+        after = untangle(shell, fixed=which, slide=slide).mesh.points
+        np.testing.assert_array_equal(after[which], shell.points[which])
+
+
+def test_a_repairer_of_a_bare_mesh_holds_what_that_holds() -> None:
+    mesh = Mesh.build(*generate.plate(0.2), fixed=[150, 151])
+    repair = Repairer(mesh, fixed=[152])
+    points = repair(perturb(mesh, 25, "h", fixed=[152])[0].points)
+    assert repair.outcome is not None and repair.outcome.valid
+    np.testing.assert_array_equal(points[150:153], mesh.points[150:153])
 
 
 def morph(mesh: Any) -> Any:
@@ -250,6 +299,8 @@ def test_a_repairer_builds_the_mesh_once(monkeypatch: pytest.MonkeyPatch) -> Non
         np.testing.assert_array_equal(repaired[-1][boundary], mesh.points[boundary])
     np.testing.assert_array_equal(repaired[0], repaired[2])
     np.testing.assert_array_equal(repair(mesh.points), mesh.points)
+    with pytest.raises(MeshfixError, match="towards and threshold exclude each other"):
+        Repairer(mesh, towards=True, threshold=20)
     with pytest.raises(MeshfixError, match="those of the mesh"):
         repair(mesh.points[1:])
     with pytest.raises(MeshfixError, match="not finite"):

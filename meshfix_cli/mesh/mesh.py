@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.elements import JUDGED, SIMPLICES
+from meshfix_cli.mesh.elements import JUDGED, SIMPLICES, counted, words
 from meshfix_cli.mesh.judged import VALID, Judged, Unfolded
 from meshfix_cli.mesh.mixed import MixedTopology, build_mixed, checked_blocks
 from meshfix_cli.mesh.topology import Topology, build_topology, names_twice, read_only, refers_outside, rows_of
@@ -29,7 +29,7 @@ SMALLEST_SIZE = 1e-45
 ON_BOUNDARY = "on the boundary"  # why a vertex is fixed, where nobody asked for it
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """Points and their topology; immutable, a moved mesh is a new one.
 
@@ -62,7 +62,7 @@ class Mesh:
     def build(
         cls,
         points: ArrayLike,
-        cells: ArrayLike | Sequence[tuple[str, ArrayLike]],
+        cells: ArrayLike | Sequence[tuple[str, ArrayLike]] | Mapping[str, ArrayLike],
         fixed: ArrayLike | None = None,
         threads: int = 1,
     ) -> Mesh:
@@ -72,7 +72,7 @@ class Mesh:
         ----------
         points : (n, d) float
             d = 2 for triangles and quadrilaterals, 3 for solids and for surfaces of these.
-        cells : (m, d+1) int, or sequence of (str, (k, nodes) int)
+        cells : (m, d+1) int, or sequence or dict of (str, (k, nodes) int)
             Simplices, or elements by their types, such as ("hexahedron", ...), which are numbered in this order.
             Numbered either way round; see `Topology.flipped`.
         fixed : (n,) bool or (k,) int, optional
@@ -110,6 +110,11 @@ class Mesh:
 
         normals = normals_seen(topology, mesh.along_curve(mesh.points), threads)
         return replace(mesh, surface=Surface(read_only(normals)))
+
+    def __repr__(self) -> str:
+        counts = [counted(len(block.rows), *words(block.element.key)) for block in self.topology.blocks]
+        free, used = int(self.movable.sum()), counted(int(self.topology.used.sum()), "vertex", "vertices")
+        return f"<{type(self).__name__}: {', '.join([*counts, used])}: {free:,} free>"
 
     @property
     def dimension(self) -> int:
@@ -289,6 +294,8 @@ def mask_of(fixed: ArrayLike, n: int) -> NDArray[np.bool_]:
 
 def _blocks_of(cells: Any) -> NDArray[Any] | list[tuple[str, Any]]:
     """Return an array of simplices, or several types of elements."""
+    if isinstance(cells, Mapping):
+        cells = list(cells.items())
     if not (isinstance(cells, Sequence) and cells and isinstance(cells[0][0], str)):
         return np.asarray(cells)
     blocks = [(key, np.asarray(rows)) for key, rows in cells]

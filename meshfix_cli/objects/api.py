@@ -164,9 +164,9 @@ def untangle(
     Parameters
     ----------
     mesh : object
-        A `meshio.Mesh`, a `pyvista.UnstructuredGrid` or `PolyData`, one of VTK, a path, a `Document`, or points
-        (n, 2 or 3) and cells as a pair: cells as an array (m, k) or as arrays by their types. It is not changed. Of a
-        `Mesh` the boundary is held.
+        A `meshio.Mesh`, a `pyvista.UnstructuredGrid`, `PolyData` or `StructuredGrid`, one of VTK, a path, a `Document`,
+        or points (n, 2 or 3) and cells as a pair: cells as an array (m, k), as arrays by their types, or as blocks of
+        meshio. It is not changed. Of a `Mesh` the boundary is held.
     strategy : str
         A key of `STRATEGIES`: see `meshfix untangle --help`.
     reference : object, optional
@@ -207,7 +207,9 @@ def untangle(
     places = None
     if before is not None:
         with naming(document.name):
-            places = places_in(_document(before, Held(join_points=join_points), None, threads)[0], moved, threads)
+            referred = _document(before, Held(join_points=join_points), None, threads)[0]
+        with naming(document.name if reference is None else f"{document.name}: as a reference"):
+            places = places_in(referred, moved, threads)
     report = repair(moved, moved.format, Files(dry_run=True), method, judge, reference=places)
     return Result(report, moved, mesh, kind)
 
@@ -379,6 +381,8 @@ def _document(mesh: Any, held: Held, fixed: ArrayLike | None, threads: int) -> t
         if fixed is not None or held != Held():
             raise OptionError("a document has been read: give fix, fixed, regions and join_points to `read`")
         return mesh, None
+    if isinstance(mesh, Result):
+        raise InvalidMeshError("a Result is no mesh: give its `mesh`")
     if isinstance(mesh, str | os.PathLike):
         return read(mesh, held.fix, held.regions, fixed=fixed, join_points=held.join_points, threads=threads), None
     kind = kind_of(mesh)

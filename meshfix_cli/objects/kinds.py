@@ -5,15 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from numbers import Integral
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError
+from meshfix_cli.mesh.elements import ELEMENTS, element_of
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
-from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, markings, runs, types_of_sizes
+from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, in_rows, markings, runs, types_of_sizes
 
 # Elements that an array (m, k) names, by the coordinates of its points and by k.
 _OF_ARRAY = {
@@ -55,7 +58,7 @@ def kind_of(mesh: object) -> Kind:
         library = cls.__module__.partition(".")[0]
         if (library, cls.__name__) == ("meshio", "Mesh"):
             return Kind("meshio.Mesh", _of_meshio, _moved_meshio)
-        if cls.__name__ in ("vtkUnstructuredGrid", "vtkPolyData"):
+        if cls.__name__ in ("vtkUnstructuredGrid", "vtkPolyData", "vtkStructuredGrid"):
             library = type(mesh).__module__.partition(".")[0]
             return Kind(f"{library}.{type(mesh).__name__}", _of_vtk, _moved_vtk)
     if isinstance(mesh, Mesh):
@@ -64,8 +67,8 @@ def kind_of(mesh: object) -> Kind:
         return Kind("(points, cells)", _of_arrays, _moved_arrays)
     raise InvalidMeshError(
         f"{type(mesh).__module__}.{type(mesh).__qualname__} is no mesh that meshfix knows: it takes a meshio.Mesh, "
-        "a pyvista.UnstructuredGrid or PolyData, one of VTK, a path, or points and cells as a pair; of other data sets "
-        "of VTK what pyvista's cast_to_unstructured_grid gives"
+        "a pyvista.UnstructuredGrid, PolyData or StructuredGrid, one of VTK, a path, or points and cells as a pair; of "
+        "other data sets of VTK what pyvista's cast_to_unstructured_grid gives"
     )
 
 
@@ -93,13 +96,14 @@ def _of_arrays(mesh: Any) -> Source:
     points, cells = np.asarray(mesh[0]), mesh[1]
     if points.ndim != 2 or points.dtype.kind not in "fiu":
         raise InvalidMeshError(f"the points are an array of shape {points.shape}, and not of (n, 2) or (n, 3) numbers")
-    return Source(points if points.dtype.kind == "f" else points.astype("f8"), [*_runs_of(points.shape[1], cells)])
+    points = points if points.dtype.kind == "f" else points.astype("f8")
+    return Source(points, [*_runs_of(points, cells)])
 
 
-def _runs_of(dimension: int, cells: Any) -> Iterable[Cells]:
-    """Give the runs of cells that an array, a dict or pairs of types and arrays name."""
-    pairs: Any = cells.items() if isinstance(cells, Mapping) else cells
-    if not isinstance(cells, Mapping) and not _are_pairs(cells):
+def _runs_of(points: NDArray[np.floating[Any]], cells: Any) -> Iterable[Cells]:
+    """Give the runs of cells that an array, a dict, pairs of types and arrays or meshio's blocks name."""
+    pairs, dimension = _pairs(cells), points.shape[1]
+    if pairs is None:
         array = np.asarray(cells)
         key = _OF_ARRAY.get((dimension, array.shape[-1])) if array.ndim == 2 else None
         if key is None:
@@ -108,19 +112,40 @@ def _runs_of(dimension: int, cells: Any) -> Iterable[Cells]:
                 f"the cells are an array of shape {array.shape}; known are {known}; others by their types, as in "
                 "{'quad': array}"
             )
+        if key == "tetra" and _are_flat(points, array):
+            raise InvalidMeshError("the cells, an array (m, 4), are in a plane: quadrilaterals are {'quad': array}")
         pairs = [(key, array)]
     for key, rows in pairs:
         array = np.asarray(rows)
         if array.ndim != 2 or array.dtype.kind not in "iu":
             raise InvalidMeshError(f"the {key} cells are not an array (m, k) of whole numbers")
-        yield Cells(TYPES[key][0] if isinstance(key, int) and key in TYPES else str(key), array)
+        name = TYPES[int(key)][0] if isinstance(key, Integral) and int(key) in TYPES else str(key)
+        if element_of(name) is None and name.isalpha():  # those of other libraries have numbers, or begin with VTK_
+            raise InvalidMeshError(f"there is no type of cells called {name!r}; there are {', '.join(ELEMENTS)}")
+        yield Cells(name, array)
 
 
-def _are_pairs(cells: Any) -> bool:
-    """Whether cells are pairs of a type and an array."""
-    return isinstance(cells, list | tuple) and all(
-        isinstance(one, list | tuple) and len(one) == 2 and isinstance(one[0], str) for one in cells
-    )
+def _pairs(cells: Any) -> list[tuple[Any, Any]] | None:
+    """Return the types of cells, by names or numbers of VTK, and their arrays; None: they are none."""
+    if isinstance(cells, Mapping):
+        return [*cells.items()]
+    if not isinstance(cells, list | tuple):
+        return None
+    if all(isinstance(getattr(one, "type", None), str) and hasattr(one, "data") for one in cells):
+        return [(one.type, one.data) for one in cells]
+    if all(isinstance(one, list | tuple) and len(one) == 2 and isinstance(one[0], str) for one in cells):
+        return [(key, rows) for key, rows in cells]
+    return None
+
+
+def _are_flat(points: NDArray[np.floating[Any]], rows: NDArray[np.integer[Any]]) -> bool:
+    """Whether cells lie in a plane; those that name other points, or none that are finite, are refused elsewhere."""
+    used = np.unique(rows)
+    if not len(used) or used.dtype.kind not in "iu" or used[0] < 0 or used[-1] >= len(points):
+        return False
+    corners = points[used].astype(np.float64)
+    spread = np.ptp(corners, axis=0)
+    return bool((spread > 0).sum() > 1 and np.isfinite(corners).all() and plane_basis(corners) is not None)
 
 
 def _moved_arrays(mesh: Any, points: NDArray[np.floating[Any]]) -> Any:
@@ -133,16 +158,18 @@ def _numpy(array: Any) -> Any:
 
 
 def _of_vtk(grid: Any) -> Source:
-    """Return what an unstructured grid or polygons hold; cells of one type are one run."""
+    """Return what an unstructured or a structured grid or polygons hold; cells of one type are one run."""
     points = _numpy(grid.GetPoints().GetData()) if grid.GetNumberOfPoints() else np.empty((0, 3))
-    types, offsets, connectivity = _cells_of_polygons(grid) if grid.IsA("vtkPolyData") else _cells_of_grid(grid)
+    structured = grid.IsA("vtkStructuredGrid")
+    cells_of = _cells_of_polygons if grid.IsA("vtkPolyData") else _cells_in_rows if structured else _cells_of_grid
+    types, offsets, connectivity = cells_of(grid)
     found = runs(types, offsets, connectivity) if len(types) else []
     point, cell = _arrays(grid.GetPointData()), _arrays(grid.GetCellData())
     arrays = Arrays(point=point, cell={name: [values[run.rows] for run in found] for name, values in cell.items()})
     regions, cells = markings(arrays.cell.keys(), [run.cells for run in found], lambda: arrays.cell, _GHOSTS_DAMAGED)
     return Source(
         points if points.dtype.kind == "f" else points.astype("f8"), cells, load=lambda: arrays,
-        regions=regions,
+        regions=regions, oriented=not structured,  # whose indices may run either way
     )  # fmt: skip
 
 
@@ -161,6 +188,13 @@ def _cells_of_grid(grid: Any) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[
     except TypeError:  # before VTK 9.6
         types = grid.GetCellTypesArray()
     return _numpy(types), *_cell_array(grid.GetCells())
+
+
+def _cells_in_rows(grid: Any) -> tuple[NDArray[Any], NDArray[np.int64], NDArray[Any]]:
+    """Return the same of a structured grid."""
+    shape = [0, 0, 0]
+    grid.GetDimensions(shape)
+    return in_rows(shape)
 
 
 def _cell_array(cells: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -130,6 +130,9 @@ def _one_of(known: Iterable[str]) -> Callable[[str, Any], Any]:
     names = list(known)
 
     def check(name: str, value: Any) -> Any:
+        if not isinstance(value, str):  # as in untangle(points, cells)
+            told = f"and no {type(value).__name__}; points and cells are one argument, a pair"
+            raise OptionError(f"{name} is one of {', '.join(names)}, {told}")
         if value not in names:
             raise OptionError(f"{name} is one of {', '.join(names)}, and not {value!r}")
         return value

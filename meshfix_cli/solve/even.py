@@ -53,7 +53,7 @@ def evened_where_poor(
         Of a valid mesh.
     free : (n,) bool
     """
-    if smallest >= max(POOR, POOR_OF_UNEVEN) * mean:
+    if smallest >= max(POOR, POOR_OF_UNEVEN) * mean or not free.any():
         return
     sizes = kernels.measure(points, stars.simplices, threads)[0]
     uneven = np.percentile(sizes, 1, method="lower") < UNEVEN * sizes.mean()

@@ -75,6 +75,7 @@ bench: $(VENV)/installed ## kernels, MESH=FILE for a mesh of yours; the process 
 	$(BIN)/python benchmarks/files.py
 	$(BIN)/python benchmarks/readers.py
 	$(BIN)/python benchmarks/batch.py
+	$(BIN)/python benchmarks/repairer.py
 
 scaling: $(VENV)/developer ## one mesh over 1, 2 and 4 processes, and a prediction for larger machines
 	$(BIN)/python benchmarks/scaling.py

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from base64 import b64encode
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
@@ -127,11 +129,36 @@ class Result(Generic[M]):
         told = f"{after.inverted:,} of {after.elements:,} elements inverted ({before.inverted:,} before)"
         return f"<{type(self).__name__} {self.report.name}: {told}, {worst} {after.smallest:.3g}>"
 
+    def plot(self, **options: Any) -> Any:
+        """Return a `pyvista.Plotter` with the mesh before and after, coloured by quality, what is inverted in red.
+
+        Solids are cut open. `result.plot().show()` opens it, in a window or in the notebook.
+
+        Parameters
+        ----------
+        options
+            Of `pyvista.Plotter`, such as `off_screen=True`.
+
+        Raises
+        ------
+        ImportError
+            There is no pyvista.
+        """
+        from meshfix_cli.report.render import plotter
+
+        return plotter(self.report, **options)
+
     def _repr_html_(self) -> str:
-        """Return what the terminal shows, for a notebook."""
+        """Return what the terminal shows, for a notebook, and to those who have imported pyvista a picture."""
         from meshfix_cli.report.terminal import as_html
 
-        return as_html(self.report)
+        picture = None
+        if "pyvista" in sys.modules:
+            from meshfix_cli.report.render import png
+
+            picture = png(self.report)
+        shown = "" if picture is None else f'<img src="data:image/png;base64,{b64encode(picture).decode()}">'
+        return as_html(self.report) + shown
 
 
 @overload

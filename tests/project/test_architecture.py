@@ -50,8 +50,9 @@ OWNERS = {
     "mpi4py": {"cli", "workers/distributed", "workers/mpi"},
     "pymetis": {"workers/distributed"},
     "matplotlib": {"report/plot"},
+    "pyvista": {"report/render"},
 }
-HEAVY = {"numpy", "scipy", "meshio", "rich", "matplotlib", "meshfix_cli.kernels"}
+HEAVY = {"numpy", "scipy", "meshio", "rich", "matplotlib", "pyvista", "meshfix_cli.kernels"}
 LINES = 500
 CODE = (".py", ".pyi", ".cpp", ".hpp", ".js", ".css", ".html", ".txt", ".toml", ".md", "")
 

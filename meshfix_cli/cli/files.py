@@ -47,7 +47,8 @@ def report_stream(files: Files) -> Any:
     """Return stdout, or stderr where the mesh goes to stdout, or to a pipe or device that stdout may be."""
     from meshfix_cli.meshfile.atomic import is_stream
 
-    return sys.stderr if is_stream(files.target) and not files.dry_run else sys.stdout
+    streamed = is_stream(files.target) and not Path(files.target).is_dir()  # which a case of OpenFOAM is
+    return sys.stderr if streamed and not files.dry_run else sys.stdout
 
 
 def given(*names: str | None) -> list[str]:

@@ -259,6 +259,10 @@ def build(
     topology = mesh.topology
     holds, between = _ends(mesh), []
     for key in () if free else source.regions:
+        if key not in source.arrays.cell:
+            raise ReadError(
+                f"the cell data {key!r}, which tell regions apart, cannot be read; --regions none ignores them"
+            )
         labels = solved.of_elements(source.arrays.cell[key])
         if key not in REGIONS and key != regions and not _are_labels(labels):
             continue

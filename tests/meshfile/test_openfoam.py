@@ -226,6 +226,13 @@ def test_a_mesh_of_openfoam_becomes_another_file(tmp_path: Path) -> None:
     assert run("untangle", "-q", folder, "-", code=1).stdout == b""
 
 
+def test_the_report_on_a_case_that_becomes_another_is_on_stdout(tmp_path: Path) -> None:
+    folder = tangled(tmp_path / "case", "text")
+    for _ in range(2):  # the second time the folder is there
+        done = run("untangle", folder, tmp_path / "out")
+        assert b"valid: no element is inverted" in done.stdout and done.stderr == b""
+
+
 def test_what_is_missing_is_named(tmp_path: Path) -> None:
     folder = tangled(tmp_path / "case", "text")
     there = folder / "constant" / "polyMesh"

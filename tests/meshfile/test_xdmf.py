@@ -441,3 +441,35 @@ def test_single_precision_beside_cannot_be_double(tmp_path: Path) -> None:
     for precision in ("", ' Precision="8"'):  # which may not be true of a data set
         with pytest.raises(ReadError, match="which cannot be double"):
             promoted(beside.replace('"Binary"', f'"Binary"{precision}').encode())
+
+
+def with_tags(folder: Path, values: NDArray[Any]) -> Path:
+    """The file of a mesh with tags of its cells, of which nothing but the file beside tells the type."""
+    path = stored(folder)
+    cells = block()[1]
+    with h5py.File(folder / "in.h5", "r+") as file:
+        file["MeshTags/cells/Values"] = values
+    mesh = re.search("<Topology.*?</Topology>", path.read_text())
+    assert mesh is not None
+    tags = (
+        '<Grid Name="cells"><xi:include xpointer="xpointer(/Xdmf/Domain/Grid/Geometry)"/>'
+        f'{mesh[0]}<Attribute Name="cells" Center="Cell"><DataItem Dimensions="{len(cells)} 1" '
+        'Format="HDF">in.h5:/MeshTags/cells/Values</DataItem></Attribute></Grid>'
+    )
+    path.write_text(path.read_text().replace("</Domain>", tags + "</Domain>"))
+    return path
+
+
+def test_tags_whose_type_only_the_file_beside_tells_are_regions(tmp_path: Path) -> None:
+    """As dolfinx writes them."""
+    labels = material(*block()).astype("i4")
+    document = read(with_tags(tmp_path, labels[:, None]))
+    assert document.source.regions == ("cells",) and len(document.regions) == 1
+    np.testing.assert_array_equal(document.source.arrays.cell["cells"][0], labels)
+
+
+def test_tags_that_cannot_be_read_are_named(tmp_path: Path) -> None:
+    path = with_tags(tmp_path, np.array([b"steel"] * len(block()[1])))
+    with pytest.raises(ReadError, match="the cell data 'cells', which tell regions apart, cannot be read"):
+        read(path)
+    assert "cells" not in str(read(path, regions="none").fixed)

@@ -241,7 +241,7 @@ class _Mesh:
         """Return the values (count,) or (count, k) of an attribute; None: they are others, or damaged."""
         with suppress(ReadError):
             item = item_of(self.tree, attribute)
-            values = self.contents.read(item)
+            values = self.contents.read(item, data=True)
             if item.dtype == np.uint8 and values.max(initial=0) < 2 <= 2 + values.min(initial=0):
                 values = values.astype(np.uint8)  # which marks a set
             if count and values.size and values.size % count == 0:

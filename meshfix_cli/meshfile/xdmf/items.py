@@ -167,8 +167,10 @@ class Contents:
             self.others[name] = self.beside(name)
         return self.others[name] if name else self.data
 
-    def read(self, item: Item) -> NDArray[Any]:
+    def read(self, item: Item, data: bool = False) -> NDArray[Any]:
         """Return numbers (size,) in the machine's byte order.
+
+        Of `data` the file beside tells the type: dolfinx says none of its tags, which are whole numbers.
 
         Raises
         ------
@@ -178,7 +180,7 @@ class Contents:
         content = self.of_file(item.file)
         if item.form == "hdf":
             with naming(item.file), hdf5.opened(content, "HDF5") as root:
-                return hdf5.numbers(_found(root, item), "f" if item.dtype.kind == "f" else "iuf").ravel()
+                return hdf5.numbers(_found(root, item), "f" if item.dtype.kind == "f" and not data else "iuf").ravel()
         if item.form == "binary":
             with naming(item.file):
                 return self._raw(item).read(content).ravel()

@@ -9,25 +9,27 @@ import sys
 from pathlib import Path
 
 import pytest
+import used
 from places import ROOT
 
 from meshfix_cli.cli import main
 
 README = (ROOT / "README.md").read_text()
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+each_page = pytest.mark.parametrize("page", PAGES, ids=[page.stem for page in PAGES])
 TEXT = "\n".join(page.read_text() for page in PAGES)
 
 SECONDS = re.compile(r"\d[\d.,e-]* (s\b|files a second)")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```", TEXT, re.MULTILINE | re.DOTALL)
+def blocks(language: str, text: str = TEXT) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
-def commands() -> list[tuple[str, str]]:
+def commands(text: str) -> list[tuple[str, str]]:
     """Commands and the output shown below each."""
     shown = []
-    for block in blocks("console"):
+    for block in blocks("console", text):
         for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
             command, _, output = part.partition("\n")
             if not command.startswith("make"):
@@ -41,6 +43,13 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def with_files(page: Path, folder: Path) -> Path:
+    """Put the files there that a page is about."""
+    if page.parent.name == "use" and page.stem in used.FILES:
+        used.FILES[page.stem](folder)
+    return folder
+
+
 def run(command: list[str], folder: Path) -> str:
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     environment = {**os.environ, "PATH": path, "PYTHONIOENCODING": "utf-8"}
@@ -49,17 +58,23 @@ def run(command: list[str], folder: Path) -> str:
     return done.stdout.decode()
 
 
-def test_commands_print_what_is_shown(folder: Path) -> None:
-    assert len(commands()) >= 5
-    for command, output in commands():
+@each_page
+def test_commands_print_what_is_shown(page: Path, folder: Path) -> None:
+    shown = commands(page.read_text())
+    if shown:
+        with_files(page, folder)
+    for command, output in shown:
         printed = run(["bash", "-o", "pipefail", "-c", command], folder)
         assert SECONDS.sub("", printed) == SECONDS.sub("", output), command
 
 
-def test_python_examples_print_what_is_shown(folder: Path) -> None:
+@each_page
+def test_python_examples_print_what_is_shown(page: Path, folder: Path) -> None:
     """Each in the folder where those before have written; what is printed follows as a block of text."""
-    examples, outputs = blocks("python"), blocks("text")
-    assert len(examples) == len(outputs) >= 4
+    examples, outputs = (blocks(language, page.read_text()) for language in ("python", "text"))
+    assert len(examples) == len(outputs)
+    if examples:
+        with_files(page, folder)
     for example, output in zip(examples, outputs, strict=True):
         assert run([sys.executable, "-c", example], folder) == output, example
 
@@ -70,6 +85,20 @@ def test_options_of_commands_for_clusters_exist() -> None:
     for name, arguments in commands:
         known = {option for parameter in main.commands[name].params for option in parameter.opts}
         assert set(re.findall(r"--[a-z-]+", arguments.partition(":::")[0])) <= known
+
+
+@each_page
+def test_options_that_pages_name_exist(page: Path) -> None:
+    """In their tables, of one command or another."""
+    known = {option for one in main.commands.values() for parameter in one.params for option in parameter.opts}
+    rows = re.findall(r"^\| (`--.*?) \|", page.read_text(), re.MULTILINE)
+    assert set(re.findall(r"`(--[a-z-]+)", "".join(rows))) <= known
+    assert rows or page.parent.name != "use"
+
+
+def test_pages_are_in_the_list_of_the_site() -> None:
+    told = set(re.findall(r"[\w/-]+\.md", (ROOT / "mkdocs.yml").read_text()))
+    assert told == {page.relative_to(ROOT / "docs").as_posix() for page in PAGES[1:]}
 
 
 def test_make_targets_exist() -> None:

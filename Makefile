@@ -91,11 +91,12 @@ docs: $(VENV)/developer ## make the pages in docs/ a site in out/site
 
 # A page of a report is drawn by a browser, which is Debian's `chromium`.
 CHROMIUM := chromium --headless --no-sandbox --hide-scrollbars --use-angle=swiftshader --enable-unsafe-swiftshader
-figures: $(VENV)/developer ## make the pictures of the README again
+figures: $(VENV)/developer ## make the pictures of the README and of the gallery again
 	mkdir -p out docs/pictures
 	$(BIN)/meshfix untangle --quiet --dry-run --plot docs/pictures/plate.svg sample_meshes/plate_tangled.vtk
 	$(BIN)/meshfix untangle --quiet --dry-run --report out/report.html sample_meshes/bracket_tangled.vtk
 	$(CHROMIUM) --window-size=1000,1130 --virtual-time-budget=4000 --screenshot=docs/pictures/report.png out/report.html
+	$(BIN)/python docs/make_gallery.py
 
 formats: $(VENV)/installed ## make the table of formats in docs/files.md, and the list in the README
 	$(BIN)/python docs/make_formats.py

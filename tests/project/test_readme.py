@@ -8,10 +8,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import make_gallery
 import pytest
 import used
 from places import ROOT
 
+from meshfix_cli import quality
 from meshfix_cli.cli import main
 
 README = (ROOT / "README.md").read_text()
@@ -117,6 +119,18 @@ def test_pictures_are_made_by_make_figures() -> None:
     assert pictures
     made = (ROOT / "Makefile").read_text().partition("\nfigures:")[2].partition("\n\n")[0]
     assert all(picture in made for picture in pictures)
+
+
+def test_the_gallery_is_what_is_drawn() -> None:
+    """Its pictures are those that its script makes, small, and what is told of them is so."""
+    names = re.findall(r"\]\(gallery/(\w+)\.png\)", (ROOT / "docs/gallery.md").read_text())
+    assert sorted(names) == sorted([*make_gallery.RENDERED, make_gallery.PLOTTED])
+    assert sorted(path.stem for path in make_gallery.GALLERY.iterdir()) == sorted(names)
+    assert sum(path.stat().st_size for path in make_gallery.GALLERY.iterdir()) < 300_000
+    told = re.findall(r"(\d+) inverted", (ROOT / "docs/gallery.md").read_text())
+    assert len(told) == len(names)
+    for name, sample in make_gallery.RENDERED.items():
+        assert str(quality(ROOT / "sample_meshes" / sample).inverted) in told, name
 
 
 def test_the_picture_of_the_plate_is_what_the_tool_draws(folder: Path) -> None:

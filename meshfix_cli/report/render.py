@@ -35,8 +35,16 @@ def plotter(report: Report, **options: Any) -> Any:
     report : Report
     options
         Of `pyvista.Plotter`.
+
+    Raises
+    ------
+    ImportError
+        There is no pyvista.
     """
-    import pyvista
+    try:
+        import pyvista
+    except ImportError as error:
+        raise ImportError("a picture needs pyvista: pip install pyvista") from error
 
     stages = list(report.meshes)
     shown = dict.fromkeys((stages[0], stages[-1]))

@@ -47,6 +47,14 @@ def test_a_notebook_shows_a_picture_to_those_who_use_pyvista(monkeypatch: pytest
     assert "<img" not in result._repr_html_()
 
 
+def test_without_pyvista_there_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    result = untangle(SAMPLES / "plate_tangled.vtk")
+    with pytest.raises(ImportError, match="a picture needs pyvista: pip install pyvista"):
+        result.plot()
+    assert "<img" not in result._repr_html_()
+
+
 def test_without_a_picture_the_table_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     result = untangle(SAMPLES / "plate_tangled.vtk")
 

@@ -86,7 +86,7 @@ class Mesh:
             an element that names a vertex twice; but for surfaces, a facet of more than two elements, a Moebius band;
             `fixed` is neither a mask nor indices.
         """
-        p = np.array(points, dtype=np.float64, order="C")
+        p = np.array(regular(points, "the points are"), dtype=np.float64, order="C")
         blocks = _blocks_of(cells)
         topology: Topology
         if isinstance(blocks, np.ndarray):
@@ -266,6 +266,17 @@ class Mesh:
         return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
 
 
+def regular(values: ArrayLike, what: str) -> NDArray[Any]:
+    """Return an array of numbers; InvalidMeshError for rows of several lengths, texts and the like."""
+    try:
+        array = np.asarray(values)
+    except ValueError as error:
+        raise InvalidMeshError(f"{what} rows of several lengths, which are no array") from error
+    if array.dtype.kind not in "biuf":
+        raise InvalidMeshError(f"{what} no array of numbers")
+    return array
+
+
 def mask_of(fixed: ArrayLike, n: int) -> NDArray[np.bool_]:
     """Return the mask (n,) of some vertices, which a mask or their indices tell.
 
@@ -274,7 +285,8 @@ def mask_of(fixed: ArrayLike, n: int) -> NDArray[np.bool_]:
     InvalidMeshError
         It is neither; numbers that are 0 or 1, one for each vertex, could be both.
     """
-    given = np.asarray(fixed)
+    given = regular(fixed, "fixed is")
+    given = given[0] if isinstance(fixed, tuple) and given.shape[:1] == (1,) and given.ndim == 2 else given  # np.where
     mask = np.zeros(n, dtype=bool)
     if given.size == 0:  # of an empty list numpy makes numbers with a point
         return mask
@@ -297,8 +309,8 @@ def _blocks_of(cells: Any) -> NDArray[Any] | list[tuple[str, Any]]:
     if isinstance(cells, Mapping):
         cells = list(cells.items())
     if not (isinstance(cells, Sequence) and cells and isinstance(cells[0][0], str)):
-        return np.asarray(cells)
-    blocks = [(key, np.asarray(rows)) for key, rows in cells]
+        return regular(cells, "the cells are")
+    blocks = [(key, regular(rows, f"the {key} cells are")) for key, rows in cells]
     keys = {key for key, _ in blocks}
     if len(keys) == 1 and keys <= {element.key for element in SIMPLICES.values()}:
         return np.concatenate([rows for _, rows in blocks])

@@ -6,12 +6,13 @@ import os
 import sys
 from base64 import b64encode
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from meshfix_cli.errors import InvalidMeshError, OptionError, naming
+from meshfix_cli.errors import InvalidMeshError, OptionError, WriteError, naming
 from meshfix_cli.mesh.mesh import Mesh, mask_of
 from meshfix_cli.meshfile.displaced import displaced, places_in
 from meshfix_cli.meshfile.document import Document, build
@@ -119,8 +120,11 @@ class Result(Generic[M]):
 
     def write(self, target: str | os.PathLike[str]) -> tuple[str, ...]:
         """Write it in the format that the name tells or the file had; return what that format does not hold."""
+        from meshfix_cli.meshfile.formats import by_name
         from meshfix_cli.meshfile.writing import write
 
+        if self.kind is not None and by_name(Path(target)) is None:
+            raise WriteError(f"{os.fspath(target)}: its extension tells no format that is known")
         return write(self.document, self.after, target)[1]
 
     def __repr__(self) -> str:

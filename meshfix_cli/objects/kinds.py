@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.mesh.elements import ELEMENTS, element_of
-from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.mesh import Mesh, regular
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.source import Arrays, Cells, Source
 from meshfix_cli.meshfile.vtk.cells import POLYDATA, TYPES, in_rows, markings, runs, types_of_sizes
@@ -93,7 +93,7 @@ def _moved_mesh(mesh: Mesh, points: NDArray[np.floating[Any]]) -> Mesh:
 
 
 def _of_arrays(mesh: Any) -> Source:
-    points, cells = np.asarray(mesh[0]), mesh[1]
+    points, cells = regular(mesh[0], "the points are"), mesh[1]
     if points.ndim != 2 or points.dtype.kind not in "fiu":
         raise InvalidMeshError(f"the points are an array of shape {points.shape}, and not of (n, 2) or (n, 3) numbers")
     points = points if points.dtype.kind == "f" else points.astype("f8")
@@ -104,7 +104,7 @@ def _runs_of(points: NDArray[np.floating[Any]], cells: Any) -> Iterable[Cells]:
     """Give the runs of cells that an array, a dict, pairs of types and arrays or meshio's blocks name."""
     pairs, dimension = _pairs(cells), points.shape[1]
     if pairs is None:
-        array = np.asarray(cells)
+        array = regular(cells, "the cells are")
         key = _OF_ARRAY.get((dimension, array.shape[-1])) if array.ndim == 2 else None
         if key is None:
             known = ", ".join(f"(m, {k}) of {name}" for (d, k), name in _OF_ARRAY.items() if d == dimension)
@@ -116,7 +116,7 @@ def _runs_of(points: NDArray[np.floating[Any]], cells: Any) -> Iterable[Cells]:
             raise InvalidMeshError("the cells, an array (m, 4), are in a plane: quadrilaterals are {'quad': array}")
         pairs = [(key, array)]
     for key, rows in pairs:
-        array = np.asarray(rows)
+        array = regular(rows, f"the {key} cells are")
         if array.ndim != 2 or array.dtype.kind not in "iu":
             raise InvalidMeshError(f"the {key} cells are not an array (m, k) of whole numbers")
         name = TYPES[int(key)][0] if isinstance(key, Integral) and int(key) in TYPES else str(key)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -38,6 +39,29 @@ def test_what_was_meant_is_told() -> None:
             ask(untangle((GRID, QUADS)))
     with pytest.raises(MeshfixError, match=r"\(points, cells\): as a reference: it has 9 points and 3 quad"):
         untangle((GRID, QUADS), reference=(GRID, QUADS[:3]))
+
+
+@pytest.mark.parametrize("build", [Mesh.build, lambda points, cells: untangle((points, cells))])
+@pytest.mark.parametrize(("points", "cells", "words"), [
+    (GRID, [[0, 1, 4], [1, 2, 5, 4]], "the cells are rows of several lengths"),
+    (GRID, {"quad": [[0, 1, 4], [1, 2, 5, 4]]}, "the quad cells are rows of several lengths"),
+    (GRID, None, "the cells are no array of numbers"),
+    ("it.vtk", QUADS, "the points are no array of numbers"),
+    (GRID.astype(complex), QUADS, "the points are no array of numbers"),
+])  # fmt: skip
+def test_what_is_no_array_of_numbers_is_one_sentence(build: Any, points: Any, cells: Any, words: str) -> None:
+    with pytest.raises(InvalidMeshError, match=words):
+        build(points, cells)
+
+
+def test_what_where_gives_is_held() -> None:
+    where = np.where((GRID == 1).all(axis=1))
+    assert untangle((GRID, QUADS), fixed=where).document.fixed["by fixed"] == 1
+
+
+def test_a_name_that_tells_no_format_is_named(tmp_path: Path) -> None:
+    with pytest.raises(MeshfixError, match="out: its extension tells no format that is known"):
+        untangle((GRID, QUADS)).write(tmp_path / "out")
 
 
 def test_cells_that_are_broken_are_not_called_flat() -> None:

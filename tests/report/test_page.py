@@ -8,7 +8,6 @@ import json
 import re
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
@@ -17,6 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import forked
 import meshio
 import numpy as np
 import pytest
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     Open = Callable[..., AbstractContextManager[Page]]
 
-MESHFIX = str(Path(sys.executable).parent / "meshfix")
 TANGLED = {2: SAMPLES / "plate_tangled.vtk", 3: SAMPLES / "bracket_tangled.vtk"}
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 EVERY_TYPE = ("quads and triangles", "hex bracket", "every solid")
@@ -48,7 +47,7 @@ HOSTILE = '</title></script><script>window.bad=1</script><img src=x onerror="win
 
 
 def run(*arguments: object, code: int = 0) -> subprocess.CompletedProcess[bytes]:
-    done = subprocess.run([MESHFIX, *map(str, arguments)], capture_output=True, check=False)
+    done = forked.run([*map(str, arguments)], b"")
     assert done.returncode == code, done.stderr.decode()
     return done
 

@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import forked
 import pytest
+from forked import MESHFIX
 from places import SAMPLES
 
-MESHFIX = str(Path(sys.executable).parent / "meshfix")
 TANGLED = str(SAMPLES / "plate_tangled.vtk")
 VALID = str(SAMPLES / "plate.vtk")
 
@@ -53,7 +54,7 @@ main(sys.argv[1:])
 
 
 def run(*arguments: object, data: bytes | None = None, code: int = 0) -> subprocess.CompletedProcess[bytes]:
-    done = subprocess.run([MESHFIX, *map(str, arguments)], input=data or b"", capture_output=True, check=False)
+    done = forked.run([*map(str, arguments)], data or b"")
     assert done.returncode == code, done.stderr.decode()
     assert b"Traceback" not in done.stderr
     return done

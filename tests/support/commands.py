@@ -12,9 +12,9 @@ from typing import Any
 
 import forked
 import pytest
-from forked import MESHFIX
 from places import SAMPLES
 
+MESHFIX = forked.MESHFIX
 TANGLED = str(SAMPLES / "plate_tangled.vtk")
 VALID = str(SAMPLES / "plate.vtk")
 

@@ -210,6 +210,7 @@ _ON_PYRAMID, _ON_WEDGE = "01 12 23 30 04 14 24 34", "01 12 20 34 45 53 03 14 25"
 _ON_HEXAHEDRON = "01 12 23 30 45 56 67 74 04 15 26 37"
 _IN_PYRAMID = "0001112223334444"  # a quarter of the way from the base to the apex
 _IN_HEXAHEDRON = "0473 1265 0154 3762 0321 4567 01234567"
+_SHAPES = (_TRIANGLE, _QUAD, _TETRA, _PYRAMID, _WEDGE, _HEXAHEDRON)
 _TABLE = (
     Element("vertex", _VERTEX, 1, vtk=1, gmsh=15),
     Element("line", _LINE, 2, vtk=3, gmsh=1),
@@ -241,7 +242,7 @@ _TABLE = (
     Element("pixel", _PIXEL, 4, vtk=8),
     Element("voxel", _VOXEL, 8, vtk=11),
     Element("polyhedron", _POLYHEDRON, 0, vtk=42),
-    *(Element(f"collapsed_{one.name}", _collapsed(one), 0) for one in (_PYRAMID, _WEDGE, _HEXAHEDRON)),
+    *(Element(f"collapsed_{one.name}", _collapsed(one), 0) for one in _SHAPES),
 )
 ELEMENTS = {element.key: element for element in _TABLE}
 

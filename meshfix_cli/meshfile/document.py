@@ -336,7 +336,7 @@ def _solved(source: Source) -> Solved:
     solved = solved_of(source.cells)
     if solved.parts:
         return solved
-    types = {run.type for run in source.cells if len(run.vertices)}
+    types = {run.type for run in solved.rest if len(run.vertices)}
     solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
     raise ReadError(f"there are no linear solid elements and no plane mesh of linear elements in it (cells: {found})")

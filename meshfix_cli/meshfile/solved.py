@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import permutations
+from itertools import combinations, permutations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.errors import InvalidMeshError, ReadError
+from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, SIMPLICES, Element, dimension_of, element_of, straight_key
 from meshfix_cli.meshfile.source import Cells
 from meshfix_cli.meshfile.splice import Turned
@@ -182,22 +182,13 @@ def solved_runs(cells: Sequence[Cells]) -> list[int]:
 def solved_of(cells: Sequence[Cells]) -> Solved:
     """Find the elements that are solved for.
 
-    A mesh of one type of simplices is left as it is: `Mesh.build` looks for what is wrong with it.
-
-    Raises
-    ------
-    InvalidMeshError
-        An element names a vertex twice and is nothing without it.
+    Those that name a vertex twice and are of no type without it, or nothing at all, are among the rest.
     """
     chosen = solved_runs(cells)
-    keys = {_key_of(cells[i].type) for i in chosen}
     rest = [run for i, run in enumerate(cells) if i not in chosen]
-    if len(keys) == 1 and keys <= _SIMPLICES:
-        return Solved(tuple(_plainly(cells[i], i) for i in chosen), tuple(rest))
-    starts = np.cumsum([0, *(len(run.vertices) for run in cells)])
     parts: list[Part] = []
     for i in chosen:
-        for part in _parts(_plainly(cells[i], i), cells[i], int(starts[i])):
+        for part in _parts(_plainly(cells[i], i)):
             if part.key in ELEMENTS and ELEMENTS[part.key].judged_by:
                 parts.append(part)
             else:
@@ -263,7 +254,7 @@ def _of_strips(strips: NDArray[np.integer[Any]], number: int) -> Part:
     return Part("triangle", triangles[kept], number, rows[kept])
 
 
-def _parts(part: Part, run: Cells, start: int) -> Iterator[Part]:
+def _parts(part: Part) -> Iterator[Part]:
     """Divide elements by what they are without the vertices that they name twice."""
     repeated = _repeats(part.vertices)
     if not repeated.any():
@@ -280,10 +271,6 @@ def _parts(part: Part, run: Cells, start: int) -> Iterator[Part]:
     for i, pattern in enumerate(patterns.tolist()):
         here = at[which == i]
         key, order = _without_repetitions(part.key, tuple(pattern))
-        if not order:
-            row = here[0] if part.rows is None else part.rows[here[0]]
-            number, named = ids_of(run, start)[row], part.vertices[here[0]].tolist()
-            raise InvalidMeshError(f"element {number} names a vertex twice: {named}")
         found.setdefault(key, []).append((here, part.vertices[here][:, order]))
     for key, pieces in found.items():
         if len({vertices.shape[1] for _, vertices in pieces}) > 1:  # collapsed ones of no type
@@ -297,8 +284,10 @@ def _parts(part: Part, run: Cells, start: int) -> Iterator[Part]:
 
 def _repeats(vertices: NDArray[np.integer[Any]]) -> NDArray[np.bool_]:
     """Mark the rows (k,) that name a vertex twice."""
-    ordered = np.sort(vertices, axis=1)
-    return (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
+    found = np.zeros(len(vertices), dtype=bool)
+    for one, other in combinations(range(vertices.shape[1]), 2):
+        found |= vertices[:, one] == vertices[:, other]
+    return found
 
 
 @cache
@@ -314,15 +303,12 @@ def _without_repetitions(key: str, first: tuple[int, ...]) -> tuple[str, list[in
     Returns
     -------
     key : str
-        A type of the same dimension, or that of collapsed elements that are of none.
+        A type of the same dimension, or that of collapsed elements that are of none, or have no size.
     order : list of int
-        Empty: nothing is left of it.
     """
     shape = ELEMENTS[key].shape
     facets = _remaining([tuple(first[node] for node in facet) for facet in shape.facets], shape.dimension)
     nodes = sorted(set(first))
-    if len(nodes) <= shape.dimension or not facets:
-        return key, []
     sizes = sorted(map(len, facets))
     for element in JUDGED:
         if element.nodes == len(nodes) and sorted(map(len, element.shape.facets)) == sizes:

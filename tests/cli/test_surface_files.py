@@ -118,3 +118,17 @@ def test_a_plane_reference_lies_in_space_and_a_bent_one_is_none_of_a_plane(tmp_p
     assert run("untangle", "--reference", plane, bent, tmp_path / "out.vtk")["valid"]
     found = CliRunner().invoke(main, ["untangle", "--reference", str(bent), str(plane), str(tmp_path / "out.vtk")])
     assert found.exit_code == 1 and "one lies in a plane and the other is a surface" in found.stderr
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".obj"])
+def test_a_triangle_of_two_vertices_is_named_and_the_others_are_mended(suffix: str, tmp_path: Path) -> None:
+    """As where a program has joined the ends of a short edge: what is beside it meets without it."""
+    points, rows = torus(24, 12, jitter=0.35)
+    start, end = rows[0, :2]
+    rows = np.where(rows == end, start, rows)
+    with np.errstate(invalid="ignore"):  # they have no normal
+        before = save(tmp_path / f"in{suffix}", points, rows)
+    report = run("untangle", before, tmp_path / f"out{suffix}")
+    assert report["not_judged"] == {"collapsed_triangle": 2}
+    assert not report["valid"]
+    assert report["quality"]["smoothed"]["percentile_1"] > report["quality"]["before"]["percentile_1"]

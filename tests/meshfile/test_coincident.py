@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from shapes import block, plate
 
 from meshfix_cli import read, untangle, write
-from meshfix_cli.errors import InvalidMeshError
 from meshfix_cli.meshfile.coincident import count, first_of_each_place
 from meshfix_cli.meshfile.document import Document
 
@@ -71,11 +70,11 @@ def test_fixed_copies_hold_the_point_that_stands_for_them(tmp_path: Path) -> Non
     assert free - held == 1
 
 
-def test_what_collapses_when_points_are_joined_is_refused(tmp_path: Path) -> None:
+def test_what_collapses_when_points_are_joined_is_named(tmp_path: Path) -> None:
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 1, 0]])
     cells = np.array([[0, 1, 2], [1, 2, 3]])
-    with pytest.raises(InvalidMeshError, match="element 1 names a vertex twice"):
-        read_back(tmp_path / "in.vtk", "triangle", points, cells, join_points=True)
+    document = read_back(tmp_path / "in.vtk", "triangle", points, cells, join_points=True)
+    assert (document.solved.m, document.not_judged) == (1, {"collapsed_triangle": 1})
 
 
 def test_signed_zeros_are_one_place_and_numbers_that_are_none_are_not() -> None:

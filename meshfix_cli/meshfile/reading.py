@@ -136,7 +136,7 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
         else _format(data, Path() if path is None else inner(path), name)
     )
     if form is None:
-        raise ReadError("the format is not recognised")
+        raise ReadError(_unknown(data, path))
     # A pipe can be read only once, and nobody but this package looks into what is compressed.
     beside = path if path is not None and (folder or path.is_file()) and packed is None else None
     if form.name in _INDICES:
@@ -146,6 +146,15 @@ def _open(path: Path | None, double: bool, name: str | None, threads: int) -> tu
     if double and source.points.dtype != np.float64:
         source = _promoted(data, form, beside)
     return source if packed is None else replace(source, packed=packed), form
+
+
+def _unknown(data: bytes, path: Path | None) -> str:
+    """Say that a format is not recognised, and of the data of an XDMF file, which file that is."""
+    if not data.startswith(b"\x89HDF"):
+        return "the format is not recognised"
+    beside = [path.with_suffix(suffix) for suffix in formats.OWN["xdmf"].extensions] if path is not None else []
+    owner = next((f"; {one.name}, beside it, may tell: name that" for one in beside if one.is_file()), "")
+    return f"is a file of HDF5 whose format is not recognised{owner}"
 
 
 def _index(name: str) -> Any:

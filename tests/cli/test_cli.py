@@ -110,6 +110,12 @@ def test_output_format_by_name_and_by_extension(tmp_path: Path) -> None:
     assert run("untangle", "--quiet", "--format", "gmsh22", TANGLED).stdout.startswith(b"$MeshFormat\n2.2")
 
 
+def test_the_data_of_another_file_name_that(tmp_path: Path) -> None:
+    (tmp_path / "mesh.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
+    (tmp_path / "mesh.xdmf").touch()
+    assert error_line("quality", tmp_path / "mesh.h5").endswith("; mesh.xdmf, beside it, may tell: name that")
+
+
 @pytest.mark.parametrize(
     ("content", "name", "words"),
     [
@@ -117,6 +123,7 @@ def test_output_format_by_name_and_by_extension(tmp_path: Path) -> None:
         (b"", "empty.vtk", "is empty"),
         (b"\x00\xff\x17binary noise" * 50, "noise.vtk", "not a readable vtk"),
         (b"\x00\xff\x17binary noise" * 50, "noise.xyz", "format is not recognised"),
+        (b"\x89HDF\r\n\x1a\n" + bytes(64), "noise.xyz", "HDF5 whose format is not recognised"),
         (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99\n", "range.obj", "line 4: there is no vertex 99"),
         (b"v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "nan.obj", "not finite"),
         (b"v 0 0 0\nv 1 0 0\nv 0 inf 0\nf 1 2 3\n", "inf.obj", "not finite"),

@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help demo test lint check sanitize fuzz stress bench scaling compare tables docs formats figures man samples clean
+.PHONY: help demo test lint check sanitize clang fuzz stress bench scaling compare tables docs formats figures man samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -60,6 +60,17 @@ sanitize: ## run the kernel tests with address and undefined-behaviour sanitiser
 	  $(VENV)-sanitize/bin/pytest -q -p no:cacheprovider \
 	  -k "not ($(NOT_SANITISED))" \
 	  tests/kernels tests/mesh tests/quality/test_obstacles.py tests/solve
+
+CLANG ?= clang++
+clang: $(VENV)/installed ## build the kernels by clang as plain C++, and compare the bits of results with those of this build
+	$(PYTHON) -m venv $(VENV)-clang
+	CXX=$(CLANG) $(VENV)-clang/bin/python -m pip install --quiet --disable-pip-version-check --no-compile . pytest \
+	  --config-settings=cmake.define.MESHFIX_PLAIN=ON --config-settings=cmake.define.MESHFIX_WERROR=ON
+	mkdir -p out
+	$(VENV)-clang/bin/pytest -q -p no:cacheprovider tests/kernels/test_text.py
+	$(BIN)/python tests/support/same_bits.py >out/bits
+	$(VENV)-clang/bin/python tests/support/same_bits.py >out/bits-clang
+	@diff out/bits out/bits-clang && sed -n '$$=' out/bits | sed 's/$$/ results have the same bits/'
 
 EXAMPLES ?= 5000
 fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format, and judge as many meshes with a fault
@@ -110,4 +121,4 @@ samples: $(VENV)/developer ## make the sample meshes again
 	$(BIN)/python sample_meshes/generate.py
 
 clean: ## remove what the other targets made
-	rm -rf $(VENV) $(VENV)-sanitize out build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-sanitize $(VENV)-clang out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,10 +1,11 @@
 // Built once for any processor and, where the compiler can, once for those with wider vectors; see __init__.py.
 #include "arrays.hpp"
+#include "common/compiler.hpp"
 #include "common/pack.hpp"
 
 #define MODULE(name, variable) NB_MODULE(name, variable)
 MODULE(MESHFIX_MODULE, m) {
-#if defined(__x86_64__) && defined(__GNUC__)
+#if MESHFIX_GNU && defined(__x86_64__)
     m.def("has_avx2", [] { return __builtin_cpu_supports("avx2") != 0; });
 #else
     m.def("has_avx2", [] { return false; });

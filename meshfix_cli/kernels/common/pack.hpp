@@ -7,6 +7,8 @@
 #include <cstdint>
 #include <cstring>
 
+#include "common/compiler.hpp"
+
 namespace meshfix {
 
 #if defined(__AVX2__)
@@ -16,7 +18,7 @@ constexpr int LANES = 2;  // what every x86-64 and every 64-bit ARM has
 #endif
 constexpr int MOST_LANES = 4;
 
-#if defined(__GNUC__)
+#if MESHFIX_GNU
 
 typedef double Pack __attribute__((vector_size(LANES * sizeof(double))));
 typedef std::int64_t PackMask __attribute__((vector_size(LANES * sizeof(double))));
@@ -88,9 +90,9 @@ inline bool all(PackMask mask) {
 // f(0), f(1), ... side by side.
 template <class F>
 inline Pack gathered(const F& f) {
-#if defined(__GNUC__) && defined(__AVX2__)
+#if MESHFIX_GNU && defined(__AVX2__)
     return Pack{f(0), f(1), f(2), f(3)};
-#elif defined(__GNUC__)
+#elif MESHFIX_GNU
     return Pack{f(0), f(1)};
 #else
     return lanewise(f);

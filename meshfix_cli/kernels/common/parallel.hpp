@@ -12,6 +12,8 @@
 #include <thread>
 #include <vector>
 
+#include "common/compiler.hpp"
+
 #if defined(__unix__) || defined(__APPLE__)
 #include <unistd.h>
 #endif
@@ -116,14 +118,14 @@ void for_each_range(std::int64_t count, std::int64_t size, int threads, const Wo
 
 // A byte that several threads may write at once.
 inline std::uint8_t load_relaxed(const std::uint8_t& byte) {
-#if defined(__GNUC__)
+#if MESHFIX_GNU
     return __atomic_load_n(&byte, __ATOMIC_RELAXED);
 #else
     return *static_cast<const volatile std::uint8_t*>(&byte);
 #endif
 }
 inline void store_relaxed(std::uint8_t& byte, std::uint8_t value) {
-#if defined(__GNUC__)
+#if MESHFIX_GNU
     __atomic_store_n(&byte, value, __ATOMIC_RELAXED);
 #else
     *static_cast<volatile std::uint8_t*>(&byte) = value;
@@ -132,7 +134,7 @@ inline void store_relaxed(std::uint8_t& byte, std::uint8_t value) {
 
 // Says that something will be read soon.
 inline void prefetch(const void* p) {
-#if defined(__GNUC__)
+#if MESHFIX_GNU
     __builtin_prefetch(p);
 #else
     static_cast<void>(p);

@@ -13,6 +13,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "common/compiler.hpp"
 #include "text/text.hpp"
 
 namespace meshfix {
@@ -171,7 +172,7 @@ inline std::int64_t read_integer_field(std::string_view text, Span field) {
 
 // Does the same for eight columns, of which none is looked at by itself.
 inline std::int64_t read_integer_columns(std::string_view text, std::int64_t at) {
-#if defined(__GNUC__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+#if MESHFIX_GNU && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
     constexpr std::uint64_t ONES = 0x0101010101010101;
     std::uint64_t bytes;
     std::memcpy(&bytes, text.data() + at, sizeof bytes);

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/compiler.hpp"
 #include "common/parallel.hpp"
 
 namespace meshfix {
@@ -167,7 +168,7 @@ inline std::int64_t digits_of_bytes(std::uint64_t bytes) {
 // Reads an integer of at most seven digits, of which none is looked at by itself: how many they are has no order that a
 // processor could foresee. Returns how many they are; 0: it is something else, or near the end.
 inline int read_few_digits(const char* p, const char* end, std::int64_t& value) {
-#if defined(__GNUC__) && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
+#if MESHFIX_GNU && __BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__
     if (end - p < 8) return 0;
     std::uint64_t bytes;
     std::memcpy(&bytes, p, sizeof bytes);

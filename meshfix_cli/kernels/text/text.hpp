@@ -328,7 +328,7 @@ bool read_number_slowly(std::string_view word, Real& value) {
 // Reads the nearest number of the type.
 template <class Real>
 bool read_number(std::string_view word, Real& value) {
-#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_PLAIN)
     const std::string_view digits = without_plus(word);
     const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
     if (error == std::errc() && end == digits.data() + digits.size()) return true;
@@ -362,7 +362,7 @@ std::string with_digits(Real value, int digits) {
 template <class Real>
 void append_shortest(std::string& text, Real value, int longest) {
     const std::size_t begin = text.size();
-#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_PLAIN)
     char buffer[64];
     text.append(buffer, std::to_chars(buffer, buffer + sizeof buffer, value).ptr);
 #else
@@ -381,7 +381,7 @@ void append_shortest(std::string& text, Real value, int longest) {
 
 // Writes a number as "-d.ddde+xx", with so many digits, or as few as read back to it (0); returns what is written.
 inline std::string_view write_scientific(char (&buffer)[40], double value, int digits) {
-#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_NO_CHARCONV)
+#if defined(__cpp_lib_to_chars) && !defined(MESHFIX_PLAIN)
     constexpr auto form = std::chars_format::scientific;
     const char* const end = digits > 0 ? std::to_chars(buffer, buffer + sizeof buffer, value, form, digits - 1).ptr
                                        : std::to_chars(buffer, buffer + sizeof buffer, value, form).ptr;

@@ -20,9 +20,10 @@ help: ## show this list
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
 $(VENV)/installed: pyproject.toml $(KERNELS) $(wildcard man/*)
-	$(PYTHON) -m venv $(VENV)
-	$(PIP) --editable . --config-settings=cmake.define.MESHFIX_WERROR=ON
-	touch $@
+	@echo "installing meshfix into $(VENV): compiling the kernels takes a minute or two"
+	@$(PYTHON) -m venv $(VENV)
+	@$(PIP) --editable . --config-settings=cmake.define.MESHFIX_WERROR=ON
+	@touch $@
 
 # What the extras name, without building the package a second time. Most of their modules are never imported.
 EXTRAS := from importlib.metadata import requires; \

@@ -37,6 +37,15 @@ def test_samples_are_repaired(sample: Path, tmp_path: Path) -> None:
     assert after["elements"] == before["elements"]
 
 
+def test_a_tangle_passes_through_streams(tmp_path: Path) -> None:
+    tangled = run("perturb", "--percent", "25", "--dist", "2h", given=(SAMPLES / "bracket.vtk").read_bytes())
+    page = tmp_path / "page.html"
+    repaired = run("untangle", "--quiet", "--report", page, given=tangled)
+    assert repaired != tangled
+    assert page.read_bytes().startswith(b"<!DOCTYPE html>")
+    run("quality", "--quiet", "-", given=repaired)
+
+
 def test_streams_and_threads_give_the_same_bytes() -> None:
     given = (SAMPLES / "bracket_tangled.vtk").read_bytes()
     results = {run("untangle", "--quiet", "--threads", str(threads), given=given) for threads in (1, 2, 3)}

@@ -121,6 +121,7 @@ figures: $(VENV)/developer ## make the pictures of the README and of the gallery
 formats: $(VENV)/installed ## make the table of formats in docs/files.md, and the list in the README
 	$(BIN)/python docs/make_formats.py
 
+# The day of the version in pyproject.toml; whatever else names one of them, tests/project/test_packages.py holds to both.
 RELEASED := 2026-12-01
 man: $(VENV)/developer ## make the manual pages in man/ of the help
 	rm -rf man && mkdir man

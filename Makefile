@@ -125,7 +125,7 @@ formats: $(VENV)/installed ## make the table of formats in docs/files.md, and th
 RELEASED := 2026-12-01
 man: $(VENV)/developer ## make the manual pages in man/ of the help
 	rm -rf man && mkdir man
-	$(BIN)/click-man --target man --man-date $(RELEASED) meshfix >/dev/null
+	$(BIN)/python docs/make_man.py man $(RELEASED)
 
 samples: $(VENV)/developer ## make the sample meshes again
 	$(BIN)/python sample_meshes/generate.py

@@ -23,9 +23,17 @@ def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None
     ctx.exit()
 
 
+EXAMPLES = (
+    ("What is wrong with a mesh", "meshfix quality tangled.vtk"),
+    ("Mend it", "meshfix untangle tangled.vtk repaired.vtk"),
+    ("Complete options and files in bash", 'eval "$(_MESHFIX_COMPLETE=bash_source meshfix)"'),
+)
+
+
 @click.group(
     cls=Group,
     commands=Commands(),
+    examples=EXAMPLES,
     short_help="Repair tangled meshes of linear elements.",
     context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from meshfix_cli.cli.files import check_input, check_other
+from meshfix_cli.cli.help import IN_OUT, PROCESS, REPORT, Command, under
 from meshfix_cli.cli.names import FILE, FOLDER, REPORT_ON_MANY
 from meshfix_cli.cli.options import (
     Show,
@@ -131,16 +132,18 @@ _listing = packed(
     "listed",
     _Listed,
     click.argument("sources", metavar="[IN]...", nargs=-1, type=FILE),
-    click.option(
+    under(
+        IN_OUT,
         "--output-dir",
         type=FOLDER,
         metavar="DIR",
         required=True,
         help="Outputs go here, under the names of the inputs.",
     ),
-    click.option("--files-from", type=FILE, metavar="FILE|-", help="Read names of more inputs, one a line."),
-    click.option("--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),
-    click.option(
+    under(IN_OUT, "--files-from", type=FILE, metavar="FILE|-", help="Read names of more inputs, one a line."),
+    under(PROCESS, "--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),
+    under(
+        REPORT,
         "--report",
         type=REPORT_ON_MANY,
         metavar="FILE.json",
@@ -150,15 +153,17 @@ _listing = packed(
 _running = packed(
     "where",
     _Run,
-    click.option(
+    under(
+        PROCESS,
         "--executor",
         type=click.Choice(EXECUTORS),
         default=EXECUTORS[0],
         show_default=True,
         help="Processes on this machine, those that mpiexec has started, or the workers of a Dask cluster.",
     ),
-    click.option("--scheduler-file", type=FILE, metavar="FILE", help="Of the Dask cluster."),
-    click.option(
+    under(PROCESS, "--scheduler-file", type=FILE, metavar="FILE", help="Of the Dask cluster."),
+    under(
+        PROCESS,
         "--jobs",
         type=click.IntRange(1, 1024),
         help="Files at once, each on one thread. [default: a process for each core; of a cluster twice its workers]",
@@ -166,10 +171,17 @@ _running = packed(
 )
 
 
-@click.command(short_help="Untangle many meshes at once.")
+EXAMPLES = (
+    ("All meshes of a folder", "meshfix batch 'meshes/*.vtk' --output-dir repaired"),
+    ("Go on with a batch that was killed", "meshfix batch --resume 'meshes/**/*.vtk' --output-dir repaired"),
+    ("The first of eight parts of the work", "meshfix batch --shard 1/8 'meshes/*.vtk' --output-dir repaired"),
+)
+
+
+@click.command(cls=Command, examples=EXAMPLES, short_help="Untangle many meshes at once.")
 @_listing
 @_running
-@click.option("--resume", is_flag=True, help="Skip a file whose output is not older, and valid.")
+@under(IN_OUT, "--resume", is_flag=True, help="Skip a file whose output is not older, and valid.")
 @storing
 @solving
 @allowing

@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.files import given
+from meshfix_cli.cli.help import FREEDOM, IN_OUT, METHOD, PROCESS, QUALITY, REPORT, under
 from meshfix_cli.cli.names import CELLS, FILE, PAGE, PLOT
 from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
@@ -208,34 +209,37 @@ def packed(name: str, kind: type, *options: Callable[..., Any]) -> Callable[...,
 holding = packed(
     "held",
     Held,
-    click.option(
+    under(
+        FREEDOM,
         "--fix",
         multiple=True,
         metavar="NAME",
         help="Hold the vertices where this point-data array is not zero, or those of this set or group of points or "
         "cells; may be given more than once. `meshfix quality --verbose` lists groups.",
     ),
-    click.option(
+    under(
+        FREEDOM,
         "--regions",
         metavar="NAME|none",
         help="Hold the interfaces between the regions of this cell-data array; none: let them move.",
     ),
-    click.option(
-        "--input-format", type=_Choice(_readers), metavar="NAME", help="What INPUT is, whatever it looks like."
+    under(
+        IN_OUT, "--input-format", type=_Choice(_readers), metavar="NAME", help="What INPUT is, whatever it looks like."
     ),
-    click.option("--join-points", is_flag=True, help="Treat points of exactly equal coordinates as one; write each."),
+    under(IN_OUT, "--join-points", is_flag=True, help="Treat points of exactly equal coordinates as one; write each."),
 )
 _SHOW = (
-    click.option("--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),
-    click.option("--json", "as_json", is_flag=True, help="Report as JSON, one object and one line for each mesh."),
-    click.option("--quiet", "-q", is_flag=True, help="Print nothing but errors."),
+    under(QUALITY, "--metric", "metrics", multiple=True, type=_Choice(_metrics), help="Add a metric to the report."),
+    under(REPORT, "--json", "as_json", is_flag=True, help="Report as JSON, one object and one line for each mesh."),
+    under(REPORT, "--quiet", "-q", is_flag=True, help="Print nothing but errors."),
 )
 showing = packed("show", Show, *_SHOW)
 reporting = packed(
     "show",
     Show,
     *_SHOW,
-    click.option(
+    under(
+        PROCESS,
         "--threads",
         type=click.IntRange(*RANGES["threads"]),
         default=cores,
@@ -243,13 +247,14 @@ reporting = packed(
     ),
 )
 _STORE = (
-    click.option("--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
-    click.option(
+    under(IN_OUT, "--double", is_flag=True, help="Store coordinates in double precision where the file has single."),
+    under(
+        IN_OUT,
         "--fix-orientation",
         is_flag=True,
         help="Renumber elements whose numbering makes them negative; turn surfaces outwards.",
     ),
-    click.option("--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
+    under(IN_OUT, "--backup", is_flag=True, help="Keep the file that OUTPUT replaces, as OUTPUT.bak."),
 )
 storing = packed("files", Files, *_STORE)
 
@@ -257,7 +262,7 @@ storing = packed("files", Files, *_STORE)
 def _output(command: Callable[..., Any]) -> Callable[..., Any]:
     """Let OUTPUT be named by an option as well."""
 
-    @click.option("--output", "-o", type=FILE, metavar="FILE", help="The same as OUTPUT.")
+    @under(IN_OUT, "--output", "-o", type=FILE, metavar="FILE", help="The same as OUTPUT.")
     @wraps(command)
     def with_output(output: str | None, **values: Any) -> Any:
         if output is not None and values["target"] != "-":
@@ -273,12 +278,13 @@ writing = packed(
     _output,
     click.argument("source", metavar="[INPUT]", default="-", type=FILE),
     click.argument("target", metavar="[OUTPUT]", default="-", type=FILE),
-    click.option("--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
+    under(IN_OUT, "--format", "form", type=_Choice(_formats), metavar="NAME", help="Format of the output."),
     *_STORE,
-    click.option("--dry-run", is_flag=True, help="Do everything but write the mesh."),
+    under(IN_OUT, "--dry-run", is_flag=True, help="Do everything but write the mesh."),
 )
 _SLIDE = (
-    click.option(
+    under(
+        FREEDOM,
         "--slide",
         type=click.Choice(SLIDES),
         default="none",
@@ -287,7 +293,8 @@ _SLIDE = (
         "flat: in planes and on straight edges; corners and what is curved stay. curved: on smooth surfaces and along "
         "their edges as well, which changes the shape a little.",
     ),
-    click.option(
+    under(
+        FREEDOM,
         "--feature-angle",
         type=_Range(*RANGES["feature_angle"]),
         default=FEATURE_ANGLE,
@@ -299,19 +306,22 @@ _SLIDE = (
 solving = packed(
     "method",
     Method,
-    click.option(
+    under(
+        METHOD,
         "--strategy",
         type=click.Choice(tuple(STRATEGIES)),
         default="auto",
         show_default=True,
         help="How inverted elements are mended; `meshfix untangle --help` explains the names.",
     ),
-    click.option(
+    under(
+        METHOD,
         "--sweeps",
         type=click.IntRange(*RANGES["sweeps"]),
         help="Untangling sweeps at most, all phases together. [default: as each needs]",
     ),
-    click.option(
+    under(
+        METHOD,
         "--smooth",
         type=_Passes(*RANGES["smooth"]),
         metavar="PASSES|auto|best",
@@ -320,17 +330,21 @@ solving = packed(
         help="Smoothing passes; auto: three, and more while angles stay below the threshold; best: then all elements "
         "at once, then the smallest angle up to its ceiling. A million tetrahedra take one core 0.4 s, with best 5 s.",
     ),
-    click.option(
+    under(
+        METHOD,
         "--threshold",
         type=_Range(*RANGES["threshold"]),
         metavar="DEGREES",
         help="Optimise stars with smaller angles or, of elements that are not simplices, scaled Jacobians below its "
         f"sine. [default: {THRESHOLD[2]:g} for plane meshes, {THRESHOLD[3]:g} for solids]",
     ),
-    click.option("--max-move", type=LENGTH, help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
-    click.option("--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."),
+    under(FREEDOM, "--max-move", type=LENGTH, help="Move no vertex farther; 0.5h: half a mean edge of INPUT."),
+    under(
+        FREEDOM, "--only-invalid", is_flag=True, help="Move only what is needed: invalid stars and rings around them."
+    ),
     *_SLIDE,
-    click.option(
+    under(
+        FREEDOM,
         "--max-deviation",
         type=LENGTH,
         default=str(MAX_DEVIATION),
@@ -338,13 +352,15 @@ solving = packed(
         help="With --slide curved, and on surfaces: no step takes the middles of edges and facets farther from the "
         "shape. h: a mean edge of the boundary, or of the surface.",
     ),
-    click.option(
+    under(
+        FREEDOM,
         "--slide-interfaces/--no-slide-interfaces",
         default=True,
         show_default=True,
         help="Whether vertices between regions slide as well.",
     ),
-    click.option(
+    under(
+        FREEDOM,
         "--curving",
         type=click.Choice(CURVINGS),
         default="hold",
@@ -357,14 +373,15 @@ sliding = packed("method", Method, *_SLIDE)
 drawing = packed(
     "draw",
     Draw,
-    click.option("--report", "page", type=PAGE, metavar="FILE.html", help="Write the report as a page with pictures."),
-    click.option("--plot", type=PLOT, metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
+    under(REPORT, "--report", "page", type=PAGE, metavar="FILE.html", help="Write the report as a page with pictures."),
+    under(REPORT, "--plot", type=PLOT, metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
 )
-drawing_cells = click.option(
-    "--cells", type=CELLS, metavar="FILE", help="Write a .vtu or .vtk with the quality of each element."
+drawing_cells = under(
+    REPORT, "--cells", type=CELLS, metavar="FILE", help="Write a .vtu or .vtk with the quality of each element."
 )
-allowing = click.option("--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
-requiring = click.option(
+allowing = under(QUALITY, "--allow-inverted", is_flag=True, help="Exit with 0 where inverted elements remain.")
+requiring = under(
+    QUALITY,
     "--require",
     "requirements",
     type=_Requirement(),

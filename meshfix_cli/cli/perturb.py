@@ -7,19 +7,25 @@ from dataclasses import replace
 import click
 
 from meshfix_cli.cli.files import open_files, report_stream
+from meshfix_cli.cli.help import FREEDOM, METHOD, Command, under
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, sliding, writing
 from meshfix_cli.repair import Files, Held, Method, tangled
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import RANGES
 
+EXAMPLES = (
+    ("As the paper does", "meshfix perturb --percent 25 --dist 2h mesh.vtk tangled.vtk"),
+    ("And mend it", "meshfix perturb --percent 5 --dist h mesh.vtk | meshfix untangle >out.vtk"),
+)
 
-@click.command(short_help="Tangle a mesh: move some interior vertices at random.")
+
+@click.command(cls=Command, examples=EXAMPLES, short_help="Tangle a mesh: move some interior vertices at random.")
 @writing
-@click.option("--percent", type=PERCENT, required=True, help="Of all vertices; interior ones move.")
-@click.option("--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")
-@click.option("--boundary", is_flag=True, help="The same as --slide flat.")
+@under(METHOD, "--percent", type=PERCENT, required=True, help="Of all vertices; interior ones move.")
+@under(METHOD, "--dist", type=LENGTH, required=True, help="2h: two mean edge lengths; 0.3: model units.")
+@under(FREEDOM, "--boundary", is_flag=True, help="The same as --slide flat.")
 @sliding
-@click.option("--seed", type=click.IntRange(*RANGES["seed"]), default=0, show_default=True)
+@under(METHOD, "--seed", type=click.IntRange(*RANGES["seed"]), default=0, show_default=True)
 @drawing
 @holding
 @reporting

@@ -15,6 +15,7 @@ from typing import IO, TYPE_CHECKING, Any, NoReturn, TextIO, cast
 
 import click
 
+from meshfix_cli.cli.help import WithExamples
 from meshfix_cli.errors import MeshfixError
 from meshfix_cli.report.plain import plain
 
@@ -55,7 +56,7 @@ class Commands(Mapping[str, click.Command]):
         return len(self.names)
 
 
-class Group(click.Group):
+class Group(WithExamples, click.Group):
     """Errors are one line on stderr and an exit code, never a traceback; signals leave no temporary file."""
 
     def main(self, *args: Any, **kwargs: Any) -> Any:

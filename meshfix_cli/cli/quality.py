@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from meshfix_cli.cli.files import check_input, check_others, given, write_cells
+from meshfix_cli.cli.help import REPORT, Command, under
 from meshfix_cli.cli.names import FILE
 from meshfix_cli.cli.options import Draw, Show, drawing, drawing_cells, holding, reporting, requiring
 from meshfix_cli.cli.process import ERROR, INVERTED, SOME_FAILED, VALID, complain
@@ -18,12 +19,22 @@ if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
 
 
-@click.command(short_help="Report the quality of meshes, and where elements are inverted.")
+EXAMPLES = (
+    ("What is wrong, and where", "meshfix quality tangled.vtk"),
+    ("Several meshes, for a program", "meshfix quality --json mesh.vtk tangled.vtk"),
+    ("Fail where an angle is small", "meshfix quality --quiet --require 'min_angle >= 20' mesh.vtk"),
+    ("The groups of a file, and the aspect ratio", "meshfix quality --verbose --metric aspect_ratio mesh.vtk"),
+)
+
+
+@click.command(
+    cls=Command, examples=EXAMPLES, short_help="Report the quality of meshes, and where elements are inverted."
+)
 @click.argument("sources", metavar="INPUT...", nargs=-1, required=True, type=FILE)
 @drawing_cells
 @drawing
-@click.option("--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
-@click.option("--verbose", "-v", is_flag=True, help="List the groups and sets of the file, and what they hold.")
+@under(REPORT, "--all", "everything", is_flag=True, help="List every inverted element, not the first ten.")
+@under(REPORT, "--verbose", "-v", is_flag=True, help="List the groups and sets of the file, and what they hold.")
 @requiring
 @holding
 @reporting

@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.files import given, open_files, report_stream, write_cells
+from meshfix_cli.cli.help import METHOD, PROCESS, REPORT, Command, under
 from meshfix_cli.cli.names import FILE, HISTORY
 from meshfix_cli.cli.options import (
     Draw,
@@ -34,30 +35,46 @@ if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
 
 
-@click.command(short_help="Move interior vertices until no element is inverted.")
+EXAMPLES = (
+    ("Mend a mesh, and see the table", "meshfix untangle tangled.vtk repaired.vtk"),
+    ("In the place of the input, of which a copy is kept", "meshfix untangle --backup mesh.vtk mesh.vtk"),
+    ("As good as the boundary lets it be", "meshfix untangle --smooth best tangled.vtk repaired.vtk"),
+    ("With the shapes that elements had before a morph", "meshfix untangle --reference mesh.vtk tangled.vtk out.vtk"),
+    ("Converted, and with a page that shows it", "meshfix untangle --report report.html tangled.vtk repaired.vtu"),
+    ("As a filter, in a batch job", "meshfix untangle --quiet <tangled.vtk >repaired.vtk"),
+)
+
+
+@click.command(cls=Command, examples=EXAMPLES, short_help="Move interior vertices until no element is inverted.")
 @writing
 @solving
-@click.option(
+@under(
+    METHOD,
     "--reference",
     type=FILE,
     metavar="FILE",
     help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in it. "
     "Of a surface: that on which its vertices move.",
 )
-@click.option(
+@under(
+    METHOD,
     "--displace",
     metavar="NAME",
     help="Move each point first by its vector in this point-data array, as a morph or a time step gives it; INPUT as "
     "it was is the reference then, unless there is another.",
 )
-@click.option("--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
+@under(REPORT, "--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells
 @drawing
 @allowing
-@click.option(
-    "--verbose", "-v", is_flag=True, help="Print a line for each sweep on stderr as it comes, and a table by types."
+@under(
+    REPORT,
+    "--verbose",
+    "-v",
+    is_flag=True,
+    help="Print a line for each sweep on stderr as it comes, and a table by types.",
 )
-@click.option("--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
+@under(PROCESS, "--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
 @requiring
 @holding
 @reporting

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 from meshfix_cli.cli.process import closed
 from meshfix_cli.errors import WriteError
@@ -32,6 +33,8 @@ def open_files(files: Files, held: Held, threads: int, *others: str | None) -> t
     check_input(files.source)
     if files.target == "-" and "stdout" in closed and not files.dry_run:
         raise WriteError("<stdout>: is closed, and the mesh goes there; name an OUTPUT")
+    if files.target == "-" and sys.stdout.isatty() and not (files.dry_run or _is_named("target", "output")):
+        raise click.UsageError("there is no OUTPUT, and stdout is a terminal; name a file, or - for the terminal")
     document, output = files.open(held, threads)
     written = (files.target,) if files.dry_run else document.outputs(files.target, output)
     check_others(beside, *document.files, *written)
@@ -41,6 +44,12 @@ def open_files(files: Files, held: Held, threads: int, *others: str | None) -> t
     if binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
+
+
+def _is_named(*parameters: str) -> bool:
+    """Whether the user has given one of these."""
+    context = click.get_current_context()
+    return any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in parameters)
 
 
 def report_stream(files: Files) -> Any:

@@ -119,9 +119,26 @@ def test_progress_and_colour_are_for_terminals(tmp_path: Path) -> None:
 def test_terminals_get_no_binary_data_and_give_no_mesh(tmp_path: Path) -> None:
     mesh = meshio.read(VALID)
     mesh.write(tmp_path / "binary.vtk", binary=True)
-    code, shown = on_terminal("untangle", tmp_path / "binary.vtk")
+    code, shown = on_terminal("untangle", tmp_path / "binary.vtk", "-")
     assert code == 2
     assert "binary data is not written to a terminal" in shown
     code, shown = on_terminal("untangle")
     assert code == 2
     assert "there is no INPUT, and stdin is a terminal" in shown
+
+
+@pytest.mark.parametrize("words", [("untangle",), ("perturb", "--percent", "5", "--dist", "h")])
+def test_a_mesh_is_poured_into_a_terminal_only_where_that_is_asked_for(words: tuple[str, ...], tmp_path: Path) -> None:
+    """And the refusal comes before any work: the file would not be found."""
+    code, shown = on_terminal(*words, tmp_path / "no.vtk")
+    assert code == 2
+    last = "Error: there is no OUTPUT, and stdout is a terminal; name a file, or - for the terminal"
+    assert shown.rstrip().splitlines()[-1] == last
+    for named in ((VALID, "-"), ("-o", "-", VALID)):
+        code, shown = on_terminal(*words, "--quiet", *named)
+        assert code == 0
+        assert shown.startswith("# vtk DataFile")
+    code, shown = on_terminal(*words, "--dry-run", VALID)
+    assert code == 0
+    assert "# vtk" not in shown
+    assert "332 triangles" in shown

@@ -63,7 +63,7 @@ def test_streams_are_compressed_as_they_come(tmp_path: Path) -> None:
     assert run("untangle", "-q", data=packed.read_bytes()).stdout == expected
     assert run("untangle", "-q", packed).stdout == expected
     assert run("untangle", "-q", TANGLED).stdout == gzip.decompress(expected)
-    code, shown = on_terminal("untangle", "-q", packed)
+    code, shown = on_terminal("untangle", "-q", packed, "-")
     assert code == 2
     assert "binary data is not written to a terminal" in shown
 

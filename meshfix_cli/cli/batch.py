@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from meshfix_cli.cli.files import check_input, check_other
-from meshfix_cli.cli.help import IN_OUT, PROCESS, REPORT, Command, under
-from meshfix_cli.cli.names import FILE, FOLDER, REPORT_ON_MANY
+from meshfix_cli.cli.files import check_input, check_others, given
+from meshfix_cli.cli.help import IN_OUT, PROCESS, Command, under
+from meshfix_cli.cli.names import FILE, FOLDER
 from meshfix_cli.cli.options import (
+    REPORTS,
     Show,
     allowing,
+    chosen,
     holding,
     packed,
     requiring,
@@ -34,7 +36,8 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from meshfix_cli.quality.requirement import Requirement
-    from meshfix_cli.workers.batch import Result
+    from meshfix_cli.report.tally import Tally
+    from meshfix_cli.workers.batch import Result, Task
 
 
 EXECUTORS = ("processes", "mpi", "dask")
@@ -60,7 +63,25 @@ class _Listed:
     files_from: str | None
     shard: slice | None
     output_dir: str
-    report: str | None
+    page: str | None
+    json: str | None
+
+    @property
+    def reports(self) -> list[str]:
+        """Files for a report on all, which are asked for."""
+        return given(self.page, self.json)
+
+    def report(self, task: Task, files: Sequence[Mapping[str, Any]], total: int, tally: Tally) -> None:
+        """Write them, of the files that are done."""
+        from meshfix_cli.meshfile.atomic import write_text
+        from meshfix_cli.report.as_json import batch_json
+
+        if self.json is not None:
+            write_text(self.json, batch_json(task.options, files, total))
+        if self.page is not None:
+            from meshfix_cli.report.page.many import page_of_many
+
+            write_text(self.page, page_of_many(files, total, tally, chosen()))
 
     def pairs(self, *, absolute: bool) -> list[tuple[str, str]]:
         """Inputs and outputs, checked before any work."""
@@ -72,14 +93,13 @@ class _Listed:
             names = [*expanded(self.sources), *(named_in(self.files_from) if self.files_from is not None else ())]
             sources = distinct(os.path.abspath(name) if absolute else name for name in names)  # noqa: PTH100
             folder = os.path.abspath(self.output_dir) if absolute else self.output_dir  # noqa: PTH100
-            pairs = list(zip(sources, outputs(sources, folder, self.report), strict=True))
+            pairs = list(zip(sources, outputs(sources, folder, self.reports), strict=True))
         except ValueError as error:
             raise click.UsageError(str(error)) from error
         if not pairs:
             raise click.UsageError("there is no IN; name files, or use --files-from")
         _make_folder(folder)
-        if self.report is not None:
-            check_other(self.report)
+        check_others(self.reports)
         return pairs[self.shard or slice(None)]
 
 
@@ -142,13 +162,7 @@ _listing = packed(
     ),
     under(IN_OUT, "--files-from", type=FILE, metavar="FILE|-", help="Read names of more inputs, one a line."),
     under(PROCESS, "--shard", type=_Shard(), help="Take every N-th file from the I-th on, for job I of N."),
-    under(
-        REPORT,
-        "--report",
-        type=REPORT_ON_MANY,
-        metavar="FILE.json",
-        help="Write the options, and each mesh before and after, as JSON.",
-    ),
+    *REPORTS,
 )
 _running = packed(
     "where",
@@ -204,9 +218,7 @@ def batch(
     IN is a file or a quoted pattern such as 'run*/**/*.vtk'. A bad file costs only itself. Prints a line for each as
     it is done, then a summary. Exits with 0 where all are valid, and with 4 where some are not or failed.
     """
-    from meshfix_cli.meshfile.atomic import write_text
-    from meshfix_cli.report.as_json import batch_json
-    from meshfix_cli.report.tally import kept
+    from meshfix_cli.report.tally import Tally, kept
     from meshfix_cli.workers.batch import Task, run
 
     helpers.add("workers")
@@ -214,30 +226,28 @@ def batch(
         if executor is None:
             return
         pairs = listed.pairs(absolute=where.executor == "dask")
-        judge = Judge(show.metrics, requirements, brief=show.quiet and listed.report is None)
+        judge = Judge(show.metrics, requirements, brief=show.quiet and not listed.reports)
         task = Task(files, held, method, judge, resume)
-        passed, done = True, {}
+        passed, done, tally = True, {}, Tally()
         try:
-            for result in _told(run(executor, (task.at(*pair) for pair in pairs), in_flight), len(pairs), show):
+            for result in _told(run(executor, (task.at(*pair) for pair in pairs), in_flight), len(pairs), show, tally):
                 passed &= _passes(result, allow_inverted)
-                if listed.report is not None:
+                if listed.reports:
                     done[result["file"]] = kept(result)
         finally:  # also where the batch is stopped
-            if listed.report is not None:
-                files_done = [done[source] for source, _ in pairs if source in done]
-                write_text(listed.report, batch_json(task.options, files_done, len(pairs)))
+            listed.report(task, [done[source] for source, _ in pairs if source in done], len(pairs), tally)
     sys.exit(VALID if passed else SOME_FAILED)
 
 
-def _told(results: Iterator[Result], total: int, show: Show) -> Iterator[Result]:
-    """Pass results through and print each, then their summary."""
-    from meshfix_cli.report.tally import Tally
+def _told(results: Iterator[Result], total: int, show: Show, tally: Tally) -> Iterator[Result]:
+    """Pass results through, count and print each, then print their summary."""
+    from meshfix_cli.report.tally import why
     from meshfix_cli.report.terminal import console, print_result, print_tally, with_counts
 
-    start, tally, out, plain = time.perf_counter(), Tally(), console(sys.stdout), not (show.quiet or show.as_json)
+    start, out, plain = time.perf_counter(), console(sys.stdout), not (show.quiet or show.as_json)
     for result in with_counts(results, total, console(sys.stderr)) if plain else results:
         if result["status"] == "failed":
-            complain(f"{result['file']}: {result['error'].removeprefix(result['file'] + ': ')}")
+            complain(f"{result['file']}: {why(result)}")
         if not show.quiet:
             print_result(result, out, show.as_json)
         tally.add(result)

@@ -71,8 +71,8 @@ def _cells() -> Sequence[str]:
 
 
 FILE, FOLDER = Name(), Name("folder")
-PAGE = Written("a report", lambda: (".html", ".htm"), hint="; --json prints the report as JSON")
-REPORT_ON_MANY = Written("a report on many meshes", lambda: (".json",))
+PAGE = Written("a report", lambda: (".html", ".htm"), hint="; --report-json writes it as JSON")
+JSON = Written("a report as JSON", lambda: (".json",))
 PLOT = Written("a plot", _plots, bare=False)
 HISTORY = Written("a history", lambda: (".csv",))
 CELLS = Written("a file of cells", _cells)

@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from meshfix_cli.cli.files import given
 from meshfix_cli.cli.help import FREEDOM, IN_OUT, METHOD, PROCESS, QUALITY, REPORT, under
-from meshfix_cli.cli.names import CELLS, FILE, PAGE, PLOT
+from meshfix_cli.cli.names import CELLS, FILE, JSON, PAGE, PLOT
 from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
 from meshfix_cli.repair import CURVINGS, MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
@@ -137,9 +137,10 @@ class Show:
 
 @dataclass(frozen=True)
 class Draw:
-    """Files that show the report as a page or as pictures."""
+    """Files that hold the report as a page, as JSON or as pictures."""
 
     page: str | None
+    json: str | None
     plot: str | None
 
     @property
@@ -156,23 +157,28 @@ class Draw:
 
     def write(self, report: Report, threads: int) -> None:
         """Draw and write them."""
-        if not self.names:
-            return
         from meshfix_cli.meshfile.atomic import write_file, write_text
+
+        if self.json is not None:
+            from meshfix_cli.report.as_json import json_line
+
+            write_text(self.json, json_line(report))
+        if self.page is None and self.plot is None:
+            return
         from meshfix_cli.report.figures import figures
 
         drawn = figures(report, threads)
         if self.page is not None:
             from meshfix_cli.report.page import page
 
-            write_text(self.page, page(report, drawn, _options()))
+            write_text(self.page, page(report, drawn, chosen()))
         if self.plot is not None:
             from meshfix_cli.report.plot import plot
 
             write_file(self.plot, partial(plot, report, drawn))
 
 
-def _options() -> dict[str, str]:
+def chosen() -> dict[str, str]:
     """Return the options of the command that runs, with the values they have."""
     context = click.get_current_context()
     values = {}
@@ -370,10 +376,14 @@ solving = packed(
     ),
 )
 sliding = packed("method", Method, *_SLIDE)
+REPORTS = (
+    under(REPORT, "--report", "page", type=PAGE, metavar="FILE.html", help="Write the report as a page."),
+    under(REPORT, "--report-json", "json", type=JSON, metavar="FILE.json", help="Write the report as JSON."),
+)
 drawing = packed(
     "draw",
     Draw,
-    under(REPORT, "--report", "page", type=PAGE, metavar="FILE.html", help="Write the report as a page with pictures."),
+    *REPORTS,
     under(REPORT, "--plot", type=PLOT, metavar="FILE", help="Write the pictures as .png, .svg or .pdf."),
 )
 drawing_cells = under(

@@ -51,7 +51,7 @@ def quality(
     """Report the quality of meshes, and where elements are inverted. One unreadable mesh does not stop the others."""
     beside = given(cells, *draw.names)
     if beside and len(sources) > 1:
-        raise click.UsageError("--cells, --report and --plot take one INPUT")
+        raise click.UsageError("--cells, --report, --report-json and --plot take one INPUT")
     draw.check()
     show.check(verbose)
     codes = set()
@@ -64,7 +64,7 @@ def quality(
             if cells is not None:
                 write_cells(document, document.mesh, cells, show.threads)
             stages = {"mesh": document.mesh}
-            groups = document.groups() if verbose or show.as_json else None
+            groups = document.groups() if verbose or show.as_json or draw.json else None
             judge = show.judge(draw, requirements)
             report = judge.report("quality", document, stages, everything=everything, groups=groups)
             draw.write(report, show.threads)

@@ -61,6 +61,11 @@ def to_json(report: Report) -> dict[str, Any]:
     }
 
 
+def json_line(report: Report) -> str:
+    """Return one JSON object, on one line."""
+    return json.dumps(to_json(report), allow_nan=False) + "\n"
+
+
 def _first_inverted(report: Report) -> Iterator[dict[str, Any]]:
     """Give an object for each inverted element that is listed, with how good it is where it may be curved."""
     listed = first_inverted(report)

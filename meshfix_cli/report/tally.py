@@ -45,6 +45,21 @@ class Tally:
                 if "scaled_jacobian" in summary:
                     self.jacobian[i] = min(self.jacobian[i], summary["scaled_jacobian"]["smallest"])
 
+    def rows(self) -> list[tuple[str, list[str]]]:
+        """Return the rows of a table with a column before and one after."""
+        angles = [f"{angle:.3f}" if math.isfinite(angle) else "" for angle in self.angle]
+        jacobians = [f"{value:.3f}" if math.isfinite(value) else "" for value in self.jacobian]
+        rows = [
+            ("files", ["", f"{self.statuses.total():,}"]),
+            *((label, ["", f"{self.statuses[status]:,}"]) for status, label in STATUSES.items()),
+            ("elements", ["", f"{self.elements:,}"]),
+            ("inverted elements", [f"{count:,}" for count in self.inverted]),
+            ("smallest angle of all [°]", angles),
+        ]
+        if any(jacobians):
+            rows.append(("smallest scaled Jacobian of all", jacobians))
+        return rows
+
 
 def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
     """Return the first and the last summary of a result; what is not known is None."""
@@ -52,8 +67,16 @@ def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, 
     return stages.get("before"), next(reversed(stages.values()), None)
 
 
+def why(result: Mapping[str, Any]) -> str:
+    """Return why a file has failed, without its name."""
+    return str(result["error"]).removeprefix(f"{result['file']}: ")
+
+
 def kept(result: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the report on a batch keeps of a result."""
-    names = ("file", "output", "status", "error", "seconds", "dimension", "elements", "vertices", "valid", "notes")
+    names = (
+        "file", "output", "status", "error", "seconds", "dimension", "elements", "vertices", "valid", "requirements",
+        "notes",
+    )  # fmt: skip
     before, after = before_and_after(result)
     return {**{name: result.get(name) for name in names}, "before": before, "after": after}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
@@ -15,7 +14,7 @@ from rich.text import Text
 
 from meshfix_cli.mesh.elements import MEASURES, counted, words
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.report.as_json import to_json
+from meshfix_cli.report.as_json import json_line
 from meshfix_cli.report.facts import (
     Report,
     binned,
@@ -88,7 +87,7 @@ def _line(out: Console, text: str, style: str = "") -> None:
 
 def print_json(report: Report, out: Console) -> None:
     """Print one JSON object, on one line."""
-    out.file.write(json.dumps(to_json(report), allow_nan=False) + "\n")
+    out.file.write(json_line(report))
 
 
 def print_result(result: Mapping[str, Any], out: Console, as_json: bool) -> None:
@@ -106,19 +105,7 @@ def print_tally(tally: Tally, seconds: float, out: Console) -> None:
     if not files:
         _line(out, "no file falls to this shard: nothing was done")
         return
-    counts = [(label, ["", f"{tally.statuses[status]:,}"]) for status, label in STATUSES.items()]
-    angles = [f"{angle:.3f}" if math.isfinite(angle) else "" for angle in tally.angle]
-    jacobians = [f"{value:.3f}" if math.isfinite(value) else "" for value in tally.jacobian]
-    rows = [
-        ("files", ["", f"{files:,}"]),
-        *counts,
-        ("elements", ["", f"{tally.elements:,}"]),
-        ("inverted elements", [f"{count:,}" for count in tally.inverted]),
-        ("smallest angle of all [°]", angles),
-    ]
-    if any(jacobians):
-        rows.append(("smallest scaled Jacobian of all", jacobians))
-    _print_table(out, ["before", "after"], rows)
+    _print_table(out, ["before", "after"], tally.rows())
     _line(out, f"{seconds:.3g} s, {files / max(seconds, 1e-9):,.2f} files a second")
 
 

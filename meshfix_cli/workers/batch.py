@@ -77,15 +77,15 @@ def distinct(names: Iterable[str]) -> list[str]:
     return list(first.values())
 
 
-def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> list[str]:
+def outputs(sources: Sequence[str], folder: str, reports: Sequence[str] = ()) -> list[str]:
     """Return the name of each output, which is that of the input in another folder.
 
     Parameters
     ----------
     sources : sequence of str
     folder : str
-    beside : str, optional
-        One more file to be written.
+    reports : sequence of str
+        More files to be written.
 
     Raises
     ------
@@ -102,13 +102,13 @@ def outputs(sources: Sequence[str], folder: str, beside: str | None = None) -> l
                 is_input = os.path.realpath(path) == os.path.realpath(other)
                 shared = "an input" if is_input else f"a piece of {other}"
                 raise ValueError(f"{path} is a piece of {source}, and {shared} as well")
-    pairs = [*zip(sources, targets, strict=True), *([(beside, beside)] if beside else [])]
+    pairs = [*zip(sources, targets, strict=True), *zip(reports, reports, strict=True)]
     pairs += [(source, target) for source, _, made in pieces for target in made]
     written: dict[str, str] = {}
     for source, target in pairs:
         place = os.path.realpath(target)
         if place in inputs:
-            target = f"the report {target}" if source == beside else target
+            target = f"the report {target}" if source in reports else target
             raise ValueError(f"{target} would replace the input {inputs[place]}")
         if place in written:
             raise ValueError(f"{written[place]} and {source} would both be written to {target}")

@@ -65,11 +65,14 @@ def test_a_terminal_gets_only_our_own_colours(hostile: Path, tmp_path: Path) -> 
 def test_batches_tell_of_them_in_one_line_each(hostile: Path, tmp_path: Path) -> None:
     broken = tmp_path / f"broken{NAME}.vtk"
     broken.write_bytes(b"")
-    report, out = tmp_path / f"{NAME}.json", tmp_path / f"out{NAME}"
-    lines = printed(run("batch", "--report", report, hostile, broken, "--output-dir", out, code=4))
+    report, page, out = tmp_path / f"{NAME}.json", tmp_path / f"{NAME}.html", tmp_path / f"out{NAME}"
+    lines = printed(
+        run("batch", "--report-json", report, "--report", page, hostile, broken, "--output-dir", out, code=4)
+    )
     assert any(line.startswith(f"{tmp_path}/{SHOWN}.vtk: valid, 89 inverted -> 0") for line in lines)
     assert f"meshfix: error: {tmp_path}/broken{SHOWN}.vtk: is empty" in lines
     assert [one["file"] for one in json.loads(report.read_text())["files"]] == [str(hostile), str(broken)]
+    assert "\x1b" not in page.read_text(encoding="utf-8")
     done = run("batch", "--json", hostile, "--output-dir", out)
     assert json.loads(done.stdout)["output"] == str(out / hostile.name)
 
@@ -145,6 +148,7 @@ def test_groups_fields_and_sets(tmp_path: Path) -> None:
         ["perturb", "--percent", "1", "--dist", "h", "--plot", "", VALID, "o.vtk"],
         ["untangle", "--history", "", VALID, "o.vtk"],
         *(["batch", option, "", VALID, "--output-dir", "out"] for option in ("--report", "--files-from")),
+        ["quality", "--report-json", "", VALID],
         ["batch", "--executor", "dask", "--scheduler-file", "", VALID, "--output-dir", "out"],
         ["batch", VALID, "--output-dir", ""],
     ],
@@ -159,8 +163,9 @@ def test_an_empty_name_is_wrong_usage(arguments: list[str], tmp_path: Path, monk
 @pytest.mark.parametrize(
     ("option", "name", "words"),
     [
-        ("--report", "r.pdf", "a report ends in .html or .htm; --json prints the report as JSON"),
-        ("--report", "x.json", "a report ends in .html or .htm; --json prints the report as JSON"),
+        ("--report", "r.pdf", "a report ends in .html or .htm; --report-json writes it as JSON"),
+        ("--report", "x.json", "a report ends in .html or .htm; --report-json writes it as JSON"),
+        ("--report-json", "x.html", "a report as JSON ends in .json"),
         ("--plot", "p.gif", "a plot ends in .png, .svg or .pdf"),
         ("--plot", "plot", "a plot ends in .png, .svg or .pdf"),
         ("--cells", "c.obj", "a file of cells ends in .vtu or .vtk"),

@@ -104,3 +104,24 @@ def test_the_numbers_of_the_result_are_at_the_top_of_the_json() -> None:
 def test_without_arguments_the_help_is_shown() -> None:
     done = subprocess.run([MESHFIX], capture_output=True, check=False)
     assert "\nCommands:\n  batch " in (done.stdout + done.stderr).decode()
+
+
+@pytest.mark.parametrize(
+    "words", [("untangle",), ("perturb", "--percent", "5", "--dist", "h", "--seed", "1"), ("quality", "--all")]
+)
+def test_the_report_is_written_as_json_as_it_is_printed(words: tuple[str, ...], tmp_path: Path) -> None:
+    """Also where nothing is printed, and with all that is asked for."""
+    written, printed = tmp_path / "r.json", tmp_path / "p.json"
+    out = [] if words[0] == "quality" else [tmp_path / "o.vtk"]
+    code = 3 if words[0] == "quality" else 0
+    run(*words, "--quiet", "--report-json", written, TANGLED, *out, code=code)
+    printed.write_bytes(run(*words, "--json", TANGLED, *out, code=code).stdout)
+    told, expected = (json.loads(path.read_text()) for path in (written, printed))
+    for facts in (told, expected):
+        for record in facts["sweeps"]:
+            del record["seconds"]
+    assert told == expected
+    assert len(told["first_inverted"]) == (89 if words[0] == "quality" else min(10, told["inverted"]))
+    link = tmp_path / "link.json"
+    link.symlink_to(TANGLED)
+    assert "is the name of a mesh" in error_line(*words, "--report-json", link, TANGLED, *out, code=2)

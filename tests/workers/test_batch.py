@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
 import time
 from collections.abc import Iterator
 from concurrent.futures import Executor, Future, wait
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -101,8 +103,9 @@ def test_a_bad_file_costs_only_itself(inputs: Path, out: Path, tmp_path: Path) -
     good = fill(inputs, "a.vtk", "b.vtk")
     (inputs / "bad.vtk").write_bytes(b"\x00noise" * 99)
     arguments = [good[0], inputs / "bad.vtk", inputs / "none.vtk", good[1]]
-    report = tmp_path / "report.json"
-    done = run("batch", "--report", report, "--strategy", "US", *arguments, "--output-dir", out, code=4)
+    report, page = tmp_path / "report.json", tmp_path / "report.html"
+    options = ["--report-json", report, "--report", page, "--strategy", "US"]
+    done = run("batch", *options, *arguments, "--output-dir", out, code=4)
     complaints = sorted(done.stderr.decode().splitlines())
     assert complaints[0].startswith(f"meshfix: error: {inputs / 'bad.vtk'}: is not a readable vtk")
     assert complaints[1:] == [f"meshfix: error: {inputs / 'none.vtk'}: No such file or directory"]
@@ -115,6 +118,20 @@ def test_a_bad_file_costs_only_itself(inputs: Path, out: Path, tmp_path: Path) -
     assert [one["status"] for one in told["files"]] == ["valid", "failed", "failed", "valid"]
     assert (told["files"][0]["before"]["inverted"], told["files"][0]["after"]["inverted"]) == (89, 0)
     assert told["files"][1]["before"] is None
+    shown = page.read_text()
+    assert "<title>4 meshes – meshfix</title>" in shown
+    assert "Not all are valid" in shown
+    assert cells(shown, inputs / "none.vtk") == ["No such file or directory"]
+    assert cells(shown, inputs / "a.vtk")[:6] == ["valid", "332", "89", "0", "0.022°", "35.886°"]
+    assert cells(shown, "inverted elements") == ["178", "0"]
+    assert cells(shown, "--strategy") == ["US"]
+    assert "<script" not in shown
+
+
+def cells(page: str, name: object) -> list[str]:
+    """What stands in the row of a name."""
+    row = page.partition(f'<th scope="row">{name}</th>')[2].partition("</tr>")[0]
+    return [unescape(one) for one in re.findall(r"<td>(.*?)</td>", row)]
 
 
 def test_what_is_not_valid_or_not_met_exits_4(inputs: Path, out: Path) -> None:
@@ -191,10 +208,11 @@ def test_shards_cover_all_files_once(inputs: Path, out: Path) -> None:
         (["in/a.vtk", "in/deep/a.vtk", "--shard", "1/2"], "would both be written"),
         (["in/a.vtk", "--output-dir", "in"], "in/a.vtk would replace the input in/a.vtk"),
         (["in/a.vtk", "--output-dir", "link"], "link/a.vtk would replace the input in/a.vtk"),
-        (["in/a.vtk", "--report", "r.html"], "r.html: the name of a report on many meshes ends in .json"),
-        (["in/a.vtk", "--report", "r.pdf"], "r.pdf: the name of a report on many meshes ends in .json"),
-        (["in/a.json", "--report", "in/a.json"], "the report in/a.json would replace the input in/a.json"),
-        (["in/a.json", "--report", "out/a.json"], "in/a.json and out/a.json would both be written to out/a.json"),
+        (["in/a.vtk", "--report-json", "r.html"], "r.html: the name of a report as JSON ends in .json"),
+        (["in/a.vtk", "--report", "r.json"], "r.json: the name of a report ends in .html or .htm"),
+        (["in/a.json", "--report-json", "in/a.json"], "the report in/a.json would replace the input in/a.json"),
+        (["in/a.json", "--report-json", "out/a.json"], "in/a.json and out/a.json would both be written to out/a.json"),
+        (["in/a.vtk", "--report", "r", "--report-json", "r"], "r and r would both be written to r"),
         (["in/a.vtk", "--shard", "0/2"], "'0/2' is not such as 1/8"),
         (["in/a.vtk", "--shard", "3/2"], "'3/2' is not such as 1/8"),
         (["in/a.vtk", "--executor", "dask"], "--executor dask and --scheduler-file go together"),
@@ -231,7 +249,7 @@ def test_nothing_is_done_where_nothing_can_be_written(inputs: Path, tmp_path: Pa
     (tmp_path / "file").touch()
     assert "is not a folder" in error_line("batch", inputs / "a.vtk", "--output-dir", tmp_path / "file")
     arguments = ["batch", inputs / "a.vtk", "--output-dir", tmp_path / "out"]
-    assert "does not exist" in error_line(*arguments, "--report", tmp_path / "no" / "r.json")
+    assert "does not exist" in error_line(*arguments, "--report-json", tmp_path / "no" / "r.json")
     assert list((tmp_path / "out").iterdir()) == []
 
 
@@ -375,7 +393,7 @@ def test_a_signal_ends_all_at_once_and_the_rest_is_resumed(
     number: signal.Signals, inputs: Path, out: Path, environment: Path, tmp_path: Path
 ) -> None:
     fill(inputs, "a.vtk", "b.vtk", "slow.vtk", "z.vtk")
-    arguments = ["--jobs", 1, inputs / "*.vtk", "--output-dir", out, "--report", tmp_path / "report.json"]
+    arguments = ["--jobs", 1, inputs / "*.vtk", "--output-dir", out, "--report-json", tmp_path / "report.json"]
     process = start(*arguments)
     who_waits(environment)
     assert any(p.is_dir() for p in out.iterdir())  # the temporary folder

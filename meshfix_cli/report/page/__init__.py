@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import base64
 import json
-import platform
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from hashlib import sha256
-from html import escape
-from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path, PurePath
 from string import Template
@@ -35,11 +31,10 @@ from meshfix_cli.report.facts import (
 )
 from meshfix_cli.report.figures import Cells, Figures, Scene, Worst, number_of
 from meshfix_cli.report.page import charts
-from meshfix_cli.report.plain import plain
+from meshfix_cli.report.page.parts import hash_of, made, scrolled, shown, table
 from meshfix_cli.report.sliding import sliding
 
 FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
-PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")
 
 Numbers = NDArray[np.float64]
 
@@ -63,19 +58,19 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
     return Template(skeleton).substitute(
         style=style,
         script=script,
-        style_hash=_hash(style),
-        script_hash=_hash(script),
-        heading=_shown(PurePath(report.name).name or report.name),
-        command=_shown(report.command),
-        subject=_shown(title(report)),
+        style_hash=hash_of(style),
+        script_hash=hash_of(script),
+        heading=shown(PurePath(report.name).name or report.name),
+        command=shown(report.command),
+        subject=shown(title(report)),
         outcome="valid" if report.valid else "wrong",
         verdict=_verdict(report),
         lead=_lead(report),
-        picture=_shown(_in_words(report, drawn.scene)),
+        picture=shown(_in_words(report, drawn.scene)),
         stages=_stages(drawn.scene),
         legend=_legend(report, drawn.scene),
         keys=_keys(drawn.scene.dimension),
-        quality=_table("Quality of each stage", ["", *report.stages], quality_rows(report)) + _by_type(report),
+        quality=table("Quality of each stage", ["", *report.stages], quality_rows(report)) + _by_type(report),
         requirements=_requirements(report),
         charted="Angles" if report.mesh.topology.simplicial else "Scaled Jacobians",
         and_convergence=" and convergence" if drawn.convergence else "",
@@ -87,37 +82,9 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
     )
 
 
-def _shown(text: str) -> str:
-    """Return text for the page, which shows it and does nothing else with it."""
-    return escape(plain(text))
-
-
-def _hash(text: str) -> str:
-    return f"sha256-{base64.b64encode(sha256(text.encode()).digest()).decode()}"
-
-
 def _json(value: object) -> str:
     """Return JSON that cannot end the script element it stands in."""
     return json.dumps(value, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
-
-
-def _table(caption: str, columns: Sequence[str], rows: Iterable[tuple[str, Sequence[str]]], style: str = "") -> str:
-    """Return a table of text; it scrolls by itself where the page is narrower."""
-    first, *others = (_shown(column) for column in columns)
-    corner = f'<th scope="col">{first}</th>' if first else "<td></td>"
-    head = corner + "".join(f'<th scope="col">{column}</th>' for column in others)
-    body = "".join(
-        f'<tr><th scope="row">{_shown(name)}</th>{"".join(f"<td>{_shown(cell)}</td>" for cell in cells)}</tr>'
-        for name, cells in rows
-    )
-    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", style)
-
-
-def _scrolled(caption: str, content: str, style: str = "") -> str:
-    return (
-        f'<div class="wide" role="region" tabindex="0" aria-label="{_shown(caption)}">'
-        f'<table class="{style}"><caption>{_shown(caption)}</caption>{content}</table></div>'
-    )
 
 
 def _verdict(report: Report) -> str:
@@ -125,21 +92,21 @@ def _verdict(report: Report) -> str:
     notes = (f"note: {note}" for note in (*report.notes, *sliding(report)))
     lines = [*verdict(replace(report, everything=False), listing=False), *notes]
     lines = [line.removeprefix("valid: ").removeprefix("NOT VALID: ") for line in lines]
-    return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{_shown(line)}</p>" for line in lines)
+    return f"<p><strong>{word}</strong></p>" + "".join(f"<p>{shown(line)}</p>" for line in lines)
 
 
 def _lead(report: Report) -> str:
     """Return the numbers that matter most, of the result and of the mesh as it came."""
     boxes = ""
     for name, values in quality_rows(report)[: 4 + is_some_inside(report)]:
-        was = f' <span class="was">from {_shown(values[0])}</span>' if len(values) > 1 else ""
-        boxes += f"<div><dt>{_shown(name)}</dt><dd>{_shown(values[-1])}{was}</dd></div>"
+        was = f' <span class="was">from {shown(values[0])}</span>' if len(values) > 1 else ""
+        boxes += f"<div><dt>{shown(name)}</dt><dd>{shown(values[-1])}{was}</dd></div>"
     return f'<dl class="lead">{boxes}</dl>'
 
 
 def _by_type(report: Report) -> str:
     types, rows = kind_rows(report)
-    return _table(f"The {_result(report)} by types of elements", ["", *types], rows) if types else ""
+    return table(f"The {_result(report)} by types of elements", ["", *types], rows) if types else ""
 
 
 def _in_words(report: Report, scene: Scene) -> str:
@@ -155,8 +122,8 @@ def _stages(scene: Scene) -> str:
         if state.left_out:
             words += f", of which {counted(state.drawn, 'is', 'are')} drawn"
         radios += (
-            f'<label><input type="radio" name="stage" value="{i}" data-drawn="{_shown(words)}"'
-            f"{' checked' * (i == 0)}>{_shown(name)}</label>"
+            f'<label><input type="radio" name="stage" value="{i}" data-drawn="{shown(words)}"'
+            f"{' checked' * (i == 0)}>{shown(name)}</label>"
         )
     return radios
 
@@ -186,7 +153,7 @@ def _keys(dimension: int) -> str:
 
 def _requirements(report: Report) -> str:
     style = {True: "met", False: "unmet"}
-    items = "".join(f'<li class="{style[met]}">{_shown(text)}</li>' for met, text in required(report))
+    items = "".join(f'<li class="{style[met]}">{shown(text)}</li>' for met, text in required(report))
     return f'<ul class="plain">{items}</ul>' if items else ""
 
 
@@ -197,7 +164,7 @@ def _charts(report: Report, drawn: Figures) -> str:
         (f"{low}–{high}{bins.unit}", [f"{one[i]:,}" for one in drawn.histograms.values()])
         for i, (low, high) in enumerate(pairwise(edges))
     ]
-    numbers = _table(f"Elements by their {bins.name}", [bins.name, *drawn.histograms], counts)
+    numbers = table(f"Elements by their {bins.name}", [bins.name, *drawn.histograms], counts)
     result = _figure(f"Elements by their {bins.long_name}", charts.histogram(drawn.histograms, bins), numbers)
     if drawn.convergence is None:
         return result
@@ -207,7 +174,7 @@ def _charts(report: Report, drawn: Figures) -> str:
 
 def _figure(caption: str, svg: str, numbers: str = "") -> str:
     details = f"<details><summary>The numbers</summary>{numbers}</details>" if numbers else ""
-    return f"<figure><figcaption>{_shown(caption)}</figcaption>{svg}{details}</figure>\n"
+    return f"<figure><figcaption>{shown(caption)}</figcaption>{svg}{details}</figure>\n"
 
 
 def _sweeps(report: Report, measure: str) -> str:
@@ -216,7 +183,7 @@ def _sweeps(report: Report, measure: str) -> str:
         for i, one in enumerate(report.records)
     ]
     columns = ["sweep", "phase", "inverted", f"smallest {measure}", "moved", "seconds"]
-    return _table("Every sweep", columns, rows)
+    return table("Every sweep", columns, rows)
 
 
 def _worst(report: Report, drawn: Figures) -> str:
@@ -225,7 +192,7 @@ def _worst(report: Report, drawn: Figures) -> str:
     body = "".join(_worst_row(one, columns, drawn.scene) for one in drawn.worst)
     count = f"{len(drawn.worst)} worst elements" if len(drawn.worst) > 1 else "worst element"
     caption = f"The {count} of the {_result(report)}, as the file numbers them"
-    return _scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", "stacked")
+    return scrolled(caption, f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody>", "stacked")
 
 
 def _worst_row(one: Worst, columns: Sequence[str], scene: Scene) -> str:
@@ -254,16 +221,7 @@ def _made(report: Report, options: Mapping[str, str]) -> str:
     if report.records:
         lines.append(("sweeps", ["; ".join(phases(report))]))
     lines += [(f"process {rank}", [text]) for rank, text in enumerate(processes(report))]
-    lines += [(package, [_version(package)]) for package in PACKAGES]
-    lines.append(("Python", [f"{platform.python_version()}, {platform.system()} {platform.machine()}"]))
-    return _table("Options and versions", ["", "value"], lines, "words")
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "not installed as a package"
+    return made(lines)
 
 
 def _placed(points: Numbers, scene: Scene) -> NDArray[np.float32]:

@@ -1,0 +1,81 @@
+"""The report on a batch as one HTML file; it needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from meshfix_cli.mesh.elements import counted
+from meshfix_cli.report.page.parts import hash_of, made, shown, table
+from meshfix_cli.report.tally import STATUSES, Tally, why
+
+WORST_FIRST = ("invalid", "valid", "skipped")
+COLUMNS = ("file", "outcome", "elements", "inverted", "after", "smallest angle or scaled Jacobian", "after", "seconds")
+
+Kept = Mapping[str, Any]
+
+
+def page_of_many(files: Sequence[Kept], total: int, tally: Tally, options: Mapping[str, str]) -> str:
+    """Return the HTML.
+
+    Parameters
+    ----------
+    files : sequence of mapping
+        What `tally.kept` gives of each that is done.
+    total : int
+        How many there are.
+    tally : Tally
+        Of those that are done.
+    options : mapping
+        Those of the command line and their values.
+    """
+    skeleton, style = (
+        (Path(__file__).parent / name).read_text(encoding="utf-8") for name in ("many.html", "style.css")
+    )
+    done = len(files) == total
+    good = all(one["status"] in ("valid", "skipped") and not _not_met(one) for one in files)
+    left = "" if done else f", of which {counted(total - len(files), 'was', 'were')} not begun or not done"
+    return Template(skeleton).substitute(
+        style=style,
+        style_hash=hash_of(style),
+        heading=shown(f"{counted(total, 'mesh', 'meshes')}{left}"),
+        outcome="valid" if good and done else "wrong",
+        verdict="All are valid" if good and done else "Stopped" if good else "Not all are valid",
+        all=table("Before and after", ["", "before", "after"], tally.rows()),
+        each="".join(_each(files)),
+        made=made((name, [value]) for name, value in options.items()),
+    )
+
+
+def _each(files: Sequence[Kept]) -> Iterator[str]:
+    """Yield a table of the meshes that could not be repaired, and one of the others, the worst first."""
+    failed = [(one["file"], [why(one)]) for one in files if one["status"] == "failed"]
+    if failed:
+        yield table("Failed", ["file", "why"], failed, "words")
+    others = sorted(
+        (one for one in files if one["status"] != "failed"), key=lambda one: WORST_FIRST.index(one["status"])
+    )
+    if others:
+        yield table("Repaired", COLUMNS, [(one["file"], _row(one)) for one in others])
+    unmet = [(one["file"], [", ".join(_not_met(one))]) for one in others if _not_met(one)]
+    if unmet:
+        yield table("Requirements that are not met", ["file", "required"], unmet, "words")
+
+
+def _row(one: Kept) -> list[str]:
+    stages = one["before"], one["after"]
+    inverted = [f"{stage['inverted']:,}" if stage else "" for stage in stages]
+    worst = [_smallest(stage) if stage else "" for stage in stages]
+    return [STATUSES[one["status"]], f"{one['elements']:,}", *inverted, *worst, f"{one['seconds']:.3g}"]
+
+
+def _smallest(stage: Mapping[str, Any]) -> str:
+    if "scaled_jacobian" in stage:
+        return f"{stage['scaled_jacobian']['smallest']:.3f}"
+    return f"{stage['min_angle']:.3f}°"
+
+
+def _not_met(one: Kept) -> list[str]:
+    return [asked["requirement"] for asked in one["requirements"] or () if not asked["met"]]

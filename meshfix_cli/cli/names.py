@@ -19,11 +19,11 @@ class Name(click.Path):
 
     def __init__(self, kind: str = "file") -> None:
         super().__init__(file_okay=kind == "file", readable=False, allow_dash=True)  # what is replaced need not be
-        self._kind = kind
+        self.kind = kind
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse an empty name, which would be that of the folder one is in."""
-        return value or self.fail(f"the name of a {self._kind} is empty", param, ctx)
+        return value or self.fail(f"the name of a {self.kind} is empty", param, ctx)
 
 
 class Written(Name):

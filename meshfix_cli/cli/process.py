@@ -70,6 +70,8 @@ class Group(WithExamples, click.Group):
             if isinstance(getattr(stream, "buffer", None), io.RawIOBase):
                 setattr(sys, name, _buffered(stream))
                 setattr(sys, f"__{name}__", getattr(sys, name))
+        if "_MESHFIX_COMPLETE" in os.environ:
+            import_module("meshfix_cli.cli.completion")
         try:
             try:
                 return super().main(*args, **kwargs)

@@ -261,15 +261,6 @@ class Method:
         )  # fmt: skip
 
 
-def tangled(document: Document, percent: float, dist: Distance, seed: int, threads: int) -> tuple[Mesh, dict[str, Any]]:
-    """Tangle a mesh, see `perturb.perturb`; return it, and what a report tells of that."""
-    from meshfix_cli.solve.perturb import perturb
-
-    length = dist.length(document.mesh, threads)
-    mesh, moved = perturb(document.mesh, percent, length, seed)
-    return mesh, {"moved": moved, "distance": length, "percent": percent, "seed": seed}
-
-
 def as_surface(document: Document) -> Document:
     """Return a document in which the vertices of a surface slide on it, if it is one, and its features are held."""
     return document if document.mesh.surface is None else Method().on_surface(document)
@@ -403,6 +394,7 @@ def repair(
     solve: Callable[..., Outcome] | None = None,
     put: Put | None = None,
     reference: NDArray[np.float64] | None = None,
+    begin: Callable[[str], object] = lambda _: None,
 ) -> Report:
     """Untangle and smooth a mesh, write it and report.
 
@@ -419,6 +411,8 @@ def repair(
         See `writing.write`.
     reference : (k, d) float64
         Gives elements their shapes, see `untangle.steps`.
+    begin : callable
+        Is told when "writing" begins, and "judging".
 
     Raises
     ------
@@ -435,8 +429,10 @@ def repair(
     document, outcome, slid = _solved(document, method, partial(solve, reference=reference), reach, reference)
     meshes = outcome.after, outcome.untangled, outcome.before
     after, rounded = document.first_valid_as_stored(*meshes, threads=threads)
+    begin("writing")
     # Processes write what they hold: not the nodes between corners.
     result, written = files.write(document, after, output, put if document.ties is None else None)
+    begin("judging")
     asked = method.smooth and not method.only_invalid and reference is None
     happened = what_happened(
         outcome, after, all_judged=not document.not_judged, asked=bool(asked), rounded=rounded,

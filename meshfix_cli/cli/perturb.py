@@ -9,8 +9,8 @@ import click
 from meshfix_cli.cli.files import open_files, report_stream
 from meshfix_cli.cli.help import FREEDOM, METHOD, Command, under
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, sliding, writing
-from meshfix_cli.repair import Files, Held, Method, tangled
-from meshfix_cli.solve.perturb import Distance
+from meshfix_cli.repair import Files, Held, Method
+from meshfix_cli.solve.perturb import Distance, tangled
 from meshfix_cli.solve.strategies import RANGES
 
 EXAMPLES = (
@@ -52,7 +52,7 @@ def perturb(
     if boundary and method.slide == "none":
         method = replace(method, slide="flat")
     document = method.freed(document)
-    perturbed, facts = tangled(document, percent, dist, seed, show.threads)
+    perturbed, facts = tangled(document.mesh, percent, dist, seed, show.threads)
     result, notes = files.write(document, perturbed, output)
     stages = {"before": document.mesh, "perturbed": result}
     notes = (*method.without_effect(document.mesh), *notes)

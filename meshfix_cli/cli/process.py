@@ -22,8 +22,11 @@ from meshfix_cli.report.plain import plain
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
+    from meshfix_cli.cli.course import Course
     from meshfix_cli.repair import Method, Steps
     from meshfix_cli.workers.distributed import Root
+
+CLEAR = "\r\x1b[2K"  # what stands in the line of a terminal
 
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
 
@@ -34,6 +37,8 @@ LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_ST
 
 # Processes that work for this one, and end with it.
 helpers: set[str] = set()
+# The run that is under way, where it is to be told how far it was when a signal ended it.
+courses: list[Course] = []
 # Streams that the shell has closed.
 closed: set[str] = set()
 
@@ -164,21 +169,37 @@ class _WrongUsage(click.UsageError):
             super().show(file)
 
 
-def _stop(number: int, frame: object) -> NoReturn:
+def _stop(number: int, frame: object) -> None:
     """End, where there is something to clear up through every `finally`; a second signal must not disturb that.
 
-    Elsewhere at once: in the middle of an import Python may drop an exception.
+    Elsewhere at once: in the middle of an import Python may drop an exception. A run that keeps its best mesh is let
+    end by itself the first time.
     """
     del frame
+    told = courses[-1] if courses and number != getattr(signal, "SIGHUP", None) else None
+    if told is not None and told.hears():
+        _say_at_once("the best mesh so far is kept once this sweep is done; a second signal ends it without that")
+        return
     signal.signal(number, signal.SIG_IGN)
     for stream in (sys.stdout, sys.stderr):  # a live line hides the cursor
         with suppress(OSError, ValueError):
             if stream.isatty():
                 os.write(stream.fileno(), b"\x1b[?25h")
+    if told is not None:
+        _say_at_once(told.ended())
     atomic = sys.modules.get("meshfix_cli.meshfile.atomic")
     if helpers or getattr(atomic, "under_way", None):
         sys.exit(128 + number)
     os._exit(128 + number)
+
+
+def _say_at_once(message: str) -> None:
+    """Print a line on stderr, past what Python may be printing there or somewhere else, and over a live line."""
+    stream = sys.__stderr__
+    if stream is None:  # closed by the shell
+        return
+    with suppress(OSError, ValueError):
+        os.write(stream.fileno(), f"{CLEAR * stream.isatty()}meshfix: {message}\n".encode())
 
 
 def complain(message: str) -> None:

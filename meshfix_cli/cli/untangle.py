@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+from meshfix_cli.cli.course import SOLVING, Course
 from meshfix_cli.cli.files import given, open_files, report_stream, write_cells
 from meshfix_cli.cli.help import METHOD, PROCESS, REPORT, Command, under
 from meshfix_cli.cli.names import FILE, HISTORY
@@ -26,13 +27,18 @@ from meshfix_cli.cli.options import (
     solving,
     writing,
 )
-from meshfix_cli.cli.process import INVERTED, VALID, processes
+from meshfix_cli.cli.process import INVERTED, VALID, courses, processes
 from meshfix_cli.errors import naming
 from meshfix_cli.repair import Files, Held, Method, repair
 from meshfix_cli.solve.strategies import senseless_beside_reference
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from meshfix_cli.meshfile.document import Document
     from meshfix_cli.quality.requirement import Requirement
+    from meshfix_cli.repair import Steps
 
 
 EXAMPLES = (
@@ -74,6 +80,12 @@ EXAMPLES = (
     is_flag=True,
     help="Print a line for each sweep on stderr as it comes, and a table by types.",
 )
+@under(
+    PROCESS,
+    "--keep-best",
+    is_flag=True,
+    help="Where Ctrl-C, or a batch system, ends it, write the best mesh so far; a second signal ends it without that.",
+)
 @under(PROCESS, "--mpi", is_flag=True, help="Share the mesh among the processes that mpiexec has started.")
 @requiring
 @holding
@@ -90,6 +102,7 @@ def untangle(
     draw: Draw,
     allow_inverted: bool,
     verbose: bool,
+    keep_best: bool,
     mpi: bool,
     requirements: tuple[Requirement, ...],
 ) -> None:
@@ -111,28 +124,29 @@ def untangle(
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
         click.get_current_context().params["threads"] = 1
+    if mpi and keep_best:
+        raise click.UsageError("--mpi and --keep-best exclude each other")
     silent = show.quiet or (show.as_json and not verbose)
-    watch = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
+    shown = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
+    course = Course(keep_best, files.dry_run)
+
+    def watch(steps: Steps) -> Steps:
+        return shown(course.follow(steps))
+
     with processes(method, show.threads, watch) if mpi else nullcontext() as root:
         if root and files.source == "-":
             raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
         draw.check()
+        courses[:] = [course]
         document, output = open_files(files, held, show.threads, history, cells, *draw.names)
         if cells is not None:
             check_cells(document, cells)
-        first, before = document, None
-        if displace is not None:
-            from meshfix_cli.meshfile.displaced import displaced, places_in
-
-            document = displaced(first, displace)
-        if reference is not None:
-            before = held.read_reference(reference, document, show.threads)
-        elif displace is not None:
-            with naming(first.name):
-                before = places_in(first, document, show.threads)
+        document, before = _displaced(document, displace, reference, held, show.threads)
         alone = partial(method.solve, threads=show.threads, watch=watch)
         solve, put = (root.solve, root.put) if root else (alone, None)
-        report = repair(document, output, files, method, show.judge(draw, requirements), solve, put, before)
+        course.begin(SOLVING, document.mesh.topology.m)
+        judge = show.judge(draw, requirements)
+        report = course.noted(repair(document, output, files, method, judge, solve, put, before, course.begin))
         if history is not None:
             write_text(history, history_csv(report.records))
         if cells is not None:
@@ -140,6 +154,23 @@ def untangle(
         draw.write(report, show.threads)
         show.print(report, report_stream(files), verbose)
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
+
+
+def _displaced(
+    first: Document, displace: str | None, reference: str | None, held: Held, threads: int
+) -> tuple[Document, NDArray[np.float64] | None]:
+    """Return the document, displaced if it is to be, and where its vertices were before the boundary moved."""
+    document = first
+    if displace is not None:
+        from meshfix_cli.meshfile.displaced import displaced, places_in
+
+        document = displaced(first, displace)
+    if reference is not None:
+        return document, held.read_reference(reference, document, threads)
+    if displace is None:
+        return document, None
+    with naming(first.name):
+        return document, places_in(first, document, threads)
 
 
 def _check_reference(option: str, reference: str | None, method: Method) -> None:

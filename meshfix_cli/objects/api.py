@@ -37,9 +37,10 @@ from meshfix_cli.objects.options import (
     threads_of,
 )
 from meshfix_cli.quality.summary import Summary, summarise
-from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair, tangled
+from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair
 from meshfix_cli.report.sliding import sliding
 from meshfix_cli.solve.perturb import perturb as perturb_mesh
+from meshfix_cli.solve.perturb import tangled
 from meshfix_cli.solve.records import Outcome, SweepRecord
 from meshfix_cli.solve.strategies import FEATURE_ANGLE
 from meshfix_cli.solve.untangle import untangle as untangle_mesh
@@ -294,7 +295,7 @@ def perturb(
         return perturb_mesh(_with_fixed(mesh, fixed), percent, length.length(mesh, threads), seed)
     document, kind = _document(mesh, held, fixed, threads)
     document = method.freed(document)
-    moved, facts = tangled(document, percent, length, seed, threads)
+    moved, facts = tangled(document.mesh, percent, length, seed, threads)
     stages = {"before": document.mesh, "perturbed": document.as_stored(moved)}
     notes = method.without_effect(document.mesh)
     return Result(Judge(threads=threads).report("perturb", document, stages, notes, facts=facts), document, mesh, kind)

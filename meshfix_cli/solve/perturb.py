@@ -86,3 +86,10 @@ def perturb(mesh: Mesh, percent: float, distance: float, seed: int = 0) -> tuple
         moving = mesh.freedom.curved & (there != start).any(axis=1)
         moved = mesh.with_vertices(np.where(moving[:, None], mesh.freedom.rounded(there)[0], there))
     return moved, len(chosen)
+
+
+def tangled(mesh: Mesh, percent: float, dist: Distance, seed: int, threads: int) -> tuple[Mesh, dict[str, float]]:
+    """Tangle a mesh, see `perturb`; return it, and what a report tells of that."""
+    length = dist.length(mesh, threads)
+    moved, count = perturb(mesh, percent, length, seed)
+    return moved, {"moved": count, "distance": length, "percent": percent, "seed": seed}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -45,7 +46,9 @@ def test_a_signal_is_no_error_of_meshio(source: str, tmp_path: Path) -> None:
     with start(SLOW_MESHIO, "untangle", "-q", path, tmp_path / "out.ply") as child:
         child.send_signal(signal.SIGTERM)
         _, complaint = child.communicate(timeout=30)
-    assert (child.returncode, complaint) == (143, b"")
+    assert child.returncode == 143
+    assert complaint.startswith(b"meshfix: interrupted while ")
+    assert complaint.count(b"\n") == 1
     assert [p.name for p in tmp_path.iterdir()] == ["mesh.post"]
 
 
@@ -60,7 +63,7 @@ def test_a_signal_leaves_no_temporary_file(name: str, tmp_path: Path) -> None:
         child.send_signal(getattr(signal, name))
         _, complaint = child.communicate(timeout=30)
     assert child.returncode == 128 + getattr(signal, name)
-    assert complaint == b""
+    assert complaint.startswith(b"meshfix: interrupted while writing; ") or name == "SIGHUP"
     assert path.read_bytes() == original
     assert list(tmp_path.iterdir()) == [path]
 
@@ -125,8 +128,8 @@ def test_a_second_run_changes_no_byte(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-def test_a_signal_at_any_time_ends_without_a_word(tmp_path: Path) -> None:
-    """Also while modules are imported, where Python may drop an exception."""
+def test_a_signal_at_any_time_ends_without_a_traceback(tmp_path: Path) -> None:
+    """Also while modules are imported, where Python may drop an exception; later in a line that says how far it was."""
     for delay in np.linspace(0.02, 0.3, 8).tolist():
         words = ["untangle", "-q", SAMPLES / "bracket_tangled.vtk", tmp_path / "o"]
         command = [sys.executable, "-m", "meshfix_cli", *map(str, words)]
@@ -135,5 +138,5 @@ def test_a_signal_at_any_time_ends_without_a_word(tmp_path: Path) -> None:
             child.send_signal(signal.SIGTERM)
             printed, complaint = child.communicate(timeout=30)
         assert child.returncode in (0, -signal.SIGTERM, 128 + signal.SIGTERM)
-        assert printed + complaint == b""
+        assert re.fullmatch(rb"(meshfix: interrupted [^\n]+\n)?", printed + complaint)
         assert {path.name for path in tmp_path.iterdir()} <= {"o"}

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from meshfix_cli.repair import Files, Held
 
 
+LARGE = 16e6  # bytes: what is smaller is read in a moment
+
+
 def check_input(source: str) -> None:
     """Refuse to read from a terminal."""
     if source == "-" and sys.stdin.isatty():
@@ -50,6 +53,14 @@ def _is_named(*parameters: str) -> bool:
     """Whether the user has given one of these."""
     context = click.get_current_context()
     return any(context.get_parameter_source(name) is ParameterSource.COMMANDLINE for name in parameters)
+
+
+def is_large(source: str) -> bool:
+    """Whether it takes a while to read a file."""
+    try:
+        return Path(source).stat().st_size >= LARGE
+    except OSError:
+        return False
 
 
 def report_stream(files: Files) -> Any:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from meshfix_cli.cli.course import SOLVING, Course
-from meshfix_cli.cli.files import given, open_files, report_stream, write_cells
+from meshfix_cli.cli.course import JUDGING, READING, SOLVING, WRITING, Course
+from meshfix_cli.cli.files import given, is_large, open_files, report_stream, write_cells
 from meshfix_cli.cli.help import METHOD, PROCESS, REPORT, Command, under
 from meshfix_cli.cli.names import FILE, HISTORY
 from meshfix_cli.cli.options import (
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.quality.requirement import Requirement
     from meshfix_cli.repair import Steps
+    from meshfix_cli.report.terminal import Shown
 
 
 EXAMPLES = (
@@ -116,7 +117,7 @@ def untangle(
     from meshfix_cli.meshfile.atomic import write_text
     from meshfix_cli.meshfile.writing import check_cells
     from meshfix_cli.report.as_json import history_csv
-    from meshfix_cli.report.terminal import console, with_progress
+    from meshfix_cli.report.terminal import Shown, console
 
     show.check(verbose)
     for option in given(reference and "--reference", displace and "--displace"):
@@ -127,33 +128,53 @@ def untangle(
     if mpi and keep_best:
         raise click.UsageError("--mpi and --keep-best exclude each other")
     silent = show.quiet or (show.as_json and not verbose)
-    shown = iter if silent else partial(with_progress, out=console(sys.stderr), every_sweep=verbose)
+    shown = Shown(None if silent else console(sys.stderr), verbose)
     course = Course(keep_best, files.dry_run)
 
     def watch(steps: Steps) -> Steps:
-        return shown(course.follow(steps))
+        return shown.follow(course.follow(steps))
+
+    def begin(doing: str) -> None:
+        course.begin(doing)
+        _show(shown, doing, files)
 
     with processes(method, show.threads, watch) if mpi else nullcontext() as root:
         if root and files.source == "-":
             raise click.UsageError("with --mpi, INPUT is a file: launchers lose what comes from stdin")
         draw.check()
         courses[:] = [course]
-        document, output = open_files(files, held, show.threads, history, cells, *draw.names)
-        if cells is not None:
-            check_cells(document, cells)
-        document, before = _displaced(document, displace, reference, held, show.threads)
-        alone = partial(method.solve, threads=show.threads, watch=watch)
-        solve, put = (root.solve, root.put) if root else (alone, None)
-        course.begin(SOLVING, document.mesh.topology.m)
-        judge = show.judge(draw, requirements)
-        report = course.noted(repair(document, output, files, method, judge, solve, put, before, course.begin))
-        if history is not None:
-            write_text(history, history_csv(report.records))
-        if cells is not None:
-            write_cells(document, report.mesh, cells, show.threads)
-        draw.write(report, show.threads)
+        with shown:
+            _show(shown, READING, files)
+            document, output = open_files(files, held, show.threads, history, cells, *draw.names)
+            if cells is not None:
+                check_cells(document, cells)
+            document, before = _displaced(document, displace, reference, held, show.threads)
+            alone = partial(method.solve, threads=show.threads, watch=watch)
+            solve, put = (root.solve, root.put) if root else (alone, None)
+            course.begin(SOLVING, document.mesh.topology.m)
+            judge = show.judge(draw, requirements)
+            report = course.noted(repair(document, output, files, method, judge, solve, put, before, begin))
+            if history is not None:
+                write_text(history, history_csv(report.records))
+            if cells is not None:
+                write_cells(document, report.mesh, cells, show.threads)
+            draw.write(report, show.threads)
         show.print(report, report_stream(files), verbose)
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
+
+
+def _show(shown: Shown, doing: str, files: Files) -> None:
+    """Show what is done, where that takes a while; what goes to a stream may go to the terminal."""
+    from meshfix_cli.meshfile.atomic import is_stream
+
+    if doing == READING and is_large(files.source):
+        shown.show(f"reading {files.source}")
+    elif doing == WRITING and (files.dry_run or is_stream(files.target)):
+        shown.hide()
+    elif doing == WRITING:
+        shown.show(f"writing {files.target}")
+    elif doing == JUDGING:
+        shown.show("measuring the quality")
 
 
 def _displaced(

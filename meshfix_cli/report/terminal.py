@@ -1,11 +1,10 @@
-"""Reports on a terminal or in a log. The only importer of rich."""
+"""Reports on a terminal or in a log."""
 
 from __future__ import annotations
 
 import io
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
@@ -33,6 +32,7 @@ from meshfix_cli.report.sliding import sliding
 from meshfix_cli.report.tally import STATUSES, Tally, before_and_after
 
 if TYPE_CHECKING:
+    from meshfix_cli.report.live import Line
     from meshfix_cli.solve.records import SweepRecord
 
 _BARS = " ▁▂▃▄▅▆▇█"
@@ -114,32 +114,66 @@ def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> 
     if not out.is_terminal:
         yield from results
         return
-    files = counted(total, "file", "files")
-    with out.status(f"0 of {files}") as status:
+    from meshfix_cli.report.live import Line
+
+    files, line = counted(total, "file", "files"), Line(out)
+    try:
+        line.show(f"0 of {files}", 0.0)
         for done, result in enumerate(results, 1):
-            status.stop()
+            line.hide()
             yield result
-            status.update(f"{done:,} of {files}")
-            status.start()
+            line.show(f"{done:,} of {files}", done / total)
+    finally:
+        line.hide()
 
 
-def with_progress(
-    run: Iterable[tuple[Mesh, SweepRecord]], out: Console, every_sweep: bool = False
-) -> Iterator[tuple[Mesh, SweepRecord]]:
-    """Pass the steps through and show them as they come: on a terminal one live line, which is gone at the end.
+class Shown:
+    """What a run does, shown as it does it: on a terminal in one line, which is gone at the end.
 
-    `every_sweep`: a plain line for each of them as well.
+    Parameters
+    ----------
+    out : Console or None
+        None: nothing is shown.
+    every_sweep : bool
+        Print a plain line for each sweep as well.
     """
-    if not (out.is_terminal or every_sweep):
-        yield from run
-        return
-    with out.status("building the topology") if out.is_terminal else nullcontext() as status:
+
+    def __init__(self, out: Console | None, every_sweep: bool = False) -> None:
+        self._out, self._every_sweep = out, every_sweep
+        self._line: Line | None = None
+
+    def __enter__(self) -> Shown:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.hide()
+
+    def hide(self) -> None:
+        """Take the line away until there is more to be shown."""
+        if self._line is not None:
+            self._line.hide()
+
+    def show(self, what: str, share: float | None = None) -> None:
+        """Show what is done now, until something else is, and which share of it, where that is known."""
+        if self._out is None or not self._out.is_terminal:
+            return
+        if self._line is None:
+            from meshfix_cli.report.live import Line
+
+            self._line = Line(self._out)
+        self._line.show(what, share)
+
+    def follow(self, run: Iterable[tuple[Mesh, SweepRecord]]) -> Iterator[tuple[Mesh, SweepRecord]]:
+        """Pass the steps through and show them as they come, and which share of the inverted elements is mended."""
+        self.show("building the topology")
+        first = 0
         for mesh, record in run:
             text = _sweep(record, mesh.dimension)
-            if status is not None:
-                status.update(text)
-            if every_sweep:
-                _line(out, f"{text}, {counted(record.moved, 'vertex', 'vertices')} moved, {record.seconds:.3g} s")
+            first = first or record.inverted
+            self.show(text, max(0.0, 1 - record.inverted / first) if record.inverted else None)
+            if self._out is not None and self._every_sweep:
+                moved = counted(record.moved, "vertex", "vertices")
+                _line(self._out, f"{text}, {moved} moved, {record.seconds:.3g} s")
             yield mesh, record
 
 

@@ -111,7 +111,7 @@ def test_progress_and_colour_are_for_terminals(tmp_path: Path) -> None:
     code, shown = on_terminal(*arguments)
     assert code == 0
     assert "\x1b[1;32mvalid: no element is inverted" in shown
-    assert "smoothing 3: 0 inverted" in shown
+    assert "measuring the quality" in shown
     assert "32m" not in on_terminal(*arguments, NO_COLOR="1")[1]
     assert b"\x1b" not in run(*arguments).stdout
 

@@ -484,8 +484,7 @@ def test_a_signal_between_two_files_leaves_no_mixture(tmp_path: Path) -> None:
     with start(SLOW_RENAME, "untangle", "-q", path, path) as child:
         child.send_signal(signal.SIGTERM)
         _, complaint = child.communicate(timeout=30)
-    said = b"meshfix: interrupted while writing; OUTPUT is what it was, or all of the new mesh\n"
-    assert (child.returncode, complaint) == (143, said)
+    assert (child.returncode, complaint.count(b"interrupted while writing")) == (143, 1)
     assert [one.read_bytes() for one in pieces(path)] == expected
     assert len(list(tmp_path.iterdir())) == 8
 

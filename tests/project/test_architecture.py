@@ -43,7 +43,7 @@ KERNEL_ROOMS: dict[str, set[str]] = {
     "common": set(),
 }
 OWNERS = {
-    "rich": {"report/terminal"},
+    "rich": {"report/terminal", "report/live"},
     "meshio": {"meshfile/formats", "meshfile/through_meshio"},
     "click": {"cli"},
     "distributed": {"workers/dask"},

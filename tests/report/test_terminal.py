@@ -10,19 +10,14 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
-from commands import TANGLED, on_terminal, run
+from commands import TANGLED, lines_of, on_terminal, run
 from files_pvtu import split
 from places import SAMPLES
 
 from meshfix_cli.report.facts import what_is_fixed
 
-ANSI = re.compile(r"\x1b\[[\d;?]*[A-Za-z]")
 # One of something that is called as several are.
 WRONG = re.compile(r"(?<![\d.,])1 (?!(is|was|has) )(\w+s|vertices|tetrahedra|polyhedra|\w+ are)\b")
-
-
-def lines_of(shown: str) -> list[str]:
-    return [line.rstrip() for line in ANSI.sub("", shown).replace("\r", "\n").split("\n")]
 
 
 def test_a_mesh_without_a_free_vertex_is_not_moved_by_a_length(tmp_path: Path) -> None:

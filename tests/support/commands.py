@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -18,6 +19,7 @@ MESHFIX = forked.MESHFIX
 TANGLED = str(SAMPLES / "plate_tangled.vtk")
 VALID = str(SAMPLES / "plate.vtk")
 
+ANSI = re.compile(r"\x1b\[[\d;?]*[A-Za-z]")
 POSIX = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 WRITES_FOR_EVER = """
 import sys
@@ -91,6 +93,11 @@ def on_terminal(*arguments: object, **environment: str) -> tuple[int, str]:
         shown += piece
     os.close(master)
     return process.wait(), shown.decode()
+
+
+def lines_of(shown: str) -> list[str]:
+    """The lines that were shown on a terminal, one after the other, without what tells it how."""
+    return [line.rstrip() for line in ANSI.sub("", shown).replace("\r", "\n").split("\n")]
 
 
 def start(code: str, *arguments: object) -> subprocess.Popen[bytes]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from meshfix_cli.cli.course import JUDGING, READING, WRITING
 from meshfix_cli.cli.process import closed
 from meshfix_cli.errors import WriteError
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.meshfile.recognise import Format
     from meshfix_cli.repair import Files, Held
+    from meshfix_cli.report.terminal import Shown
 
 
 LARGE = 16e6  # bytes: what is smaller is read in a moment
@@ -61,6 +63,20 @@ def is_large(source: str) -> bool:
         return Path(source).stat().st_size >= LARGE
     except OSError:
         return False
+
+
+def show_stage(shown: Shown, doing: str, files: Files) -> None:
+    """Show what is done, where that takes a while; what goes to a stream may go to the terminal."""
+    from meshfix_cli.meshfile.atomic import is_stream
+
+    if doing == READING and is_large(files.source):
+        shown.show(f"reading {files.source}")
+    elif doing == WRITING and (files.dry_run or is_stream(files.target)):
+        shown.hide()
+    elif doing == WRITING:
+        shown.show(f"writing {files.target}")
+    elif doing == JUDGING:
+        shown.show("measuring the quality")
 
 
 def report_stream(files: Files) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import partial, wraps
@@ -22,6 +23,7 @@ from meshfix_cli.solve.strategies import FEATURE_ANGLE, RANGES, SMOOTH, STRATEGI
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
     from meshfix_cli.report.facts import Report
+    from meshfix_cli.report.terminal import Shown
 
 
 class _Choice(click.Choice):  # type: ignore[type-arg]
@@ -124,6 +126,13 @@ class Show:
         """Refuse to tell more and nothing."""
         if verbose and self.quiet:
             raise click.UsageError("--quiet and --verbose exclude each other")
+
+    def live(self, wanted: bool, every_sweep: bool = False) -> Shown:
+        """Return what shows on a terminal what is done; `every_sweep`: a line for each of them, also elsewhere."""
+        from meshfix_cli.report.terminal import Shown, console
+
+        silent = self.quiet or (self.as_json and not every_sweep)
+        return Shown(console(sys.stderr) if wanted and not silent else None, every_sweep)
 
     def print(self, report: Report, stream: Any, by_type: bool = False) -> None:
         """Print a report as it is asked for; `by_type`: with a table by types of elements."""

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import click
 
-from meshfix_cli.cli.files import open_files, report_stream
+from meshfix_cli.cli.course import JUDGING, READING, WRITING
+from meshfix_cli.cli.files import is_large, open_files, report_stream, show_stage
 from meshfix_cli.cli.help import FREEDOM, METHOD, Command, under
 from meshfix_cli.cli.options import LENGTH, PERCENT, Draw, Show, drawing, holding, reporting, sliding, writing
 from meshfix_cli.repair import Files, Held, Method
@@ -48,14 +49,18 @@ def perturb(
     whether or not elements are inverted.
     """
     draw.check()
-    document, output = open_files(files, held, show.threads, *draw.names)
     if boundary and method.slide == "none":
         method = replace(method, slide="flat")
-    document = method.freed(document)
-    perturbed, facts = tangled(document.mesh, percent, dist, seed, show.threads)
-    result, notes = files.write(document, perturbed, output)
-    stages = {"before": document.mesh, "perturbed": result}
-    notes = (*method.without_effect(document.mesh), *notes)
-    report = show.judge(draw).report("perturb", document, stages, notes, facts=facts)
-    draw.write(report, show.threads)
+    with show.live(wanted=is_large(files.source)) as shown:
+        show_stage(shown, READING, files)
+        document, output = open_files(files, held, show.threads, *draw.names)
+        document = method.freed(document)
+        perturbed, facts = tangled(document.mesh, percent, dist, seed, show.threads)
+        show_stage(shown, WRITING, files)
+        result, notes = files.write(document, perturbed, output)
+        show_stage(shown, JUDGING, files)
+        stages = {"before": document.mesh, "perturbed": result}
+        notes = (*method.without_effect(document.mesh), *notes)
+        report = show.judge(draw).report("perturb", document, stages, notes, facts=facts)
+        draw.write(report, show.threads)
     show.print(report, report_stream(files))

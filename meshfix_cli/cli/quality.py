@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from meshfix_cli.cli.files import check_input, check_others, given, write_cells
+from meshfix_cli.cli.files import check_input, check_others, given, is_large, write_cells
 from meshfix_cli.cli.help import REPORT, Command, under
 from meshfix_cli.cli.names import FILE
 from meshfix_cli.cli.options import Draw, Show, drawing, drawing_cells, holding, reporting, requiring
@@ -57,17 +57,20 @@ def quality(
     codes = set()
     for source in sources:
         try:
-            check_input(source)
-            check_others(beside, source)
-            document = as_surface(held.read(source, show.threads))
-            check_others(beside, *document.files)
-            if cells is not None:
-                write_cells(document, document.mesh, cells, show.threads)
-            stages = {"mesh": document.mesh}
-            groups = document.groups() if verbose or show.as_json or draw.json else None
-            judge = show.judge(draw, requirements)
-            report = judge.report("quality", document, stages, everything=everything, groups=groups)
-            draw.write(report, show.threads)
+            with show.live(wanted=is_large(source)) as shown:
+                shown.show(f"reading {source}")
+                check_input(source)
+                check_others(beside, source)
+                document = as_surface(held.read(source, show.threads))
+                check_others(beside, *document.files)
+                shown.show("measuring the quality")
+                if cells is not None:
+                    write_cells(document, document.mesh, cells, show.threads)
+                stages = {"mesh": document.mesh}
+                groups = document.groups() if verbose or show.as_json or draw.json else None
+                judge = show.judge(draw, requirements)
+                report = judge.report("quality", document, stages, everything=everything, groups=groups)
+                draw.write(report, show.threads)
         except MeshfixError as error:
             complain(str(error))
             codes.add(ERROR)

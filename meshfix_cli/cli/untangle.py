@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
-from meshfix_cli.cli.course import JUDGING, READING, SOLVING, WRITING, Course
-from meshfix_cli.cli.files import given, is_large, open_files, report_stream, write_cells
+from meshfix_cli.cli.course import READING, SOLVING, Course
+from meshfix_cli.cli.files import given, open_files, report_stream, show_stage, write_cells
 from meshfix_cli.cli.help import METHOD, PROCESS, REPORT, Command, under
 from meshfix_cli.cli.names import FILE, HISTORY
 from meshfix_cli.cli.options import (
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from meshfix_cli.meshfile.document import Document
     from meshfix_cli.quality.requirement import Requirement
     from meshfix_cli.repair import Steps
-    from meshfix_cli.report.terminal import Shown
 
 
 EXAMPLES = (
@@ -117,7 +116,6 @@ def untangle(
     from meshfix_cli.meshfile.atomic import write_text
     from meshfix_cli.meshfile.writing import check_cells
     from meshfix_cli.report.as_json import history_csv
-    from meshfix_cli.report.terminal import Shown, console
 
     show.check(verbose)
     for option in given(reference and "--reference", displace and "--displace"):
@@ -127,8 +125,7 @@ def untangle(
         click.get_current_context().params["threads"] = 1
     if mpi and keep_best:
         raise click.UsageError("--mpi and --keep-best exclude each other")
-    silent = show.quiet or (show.as_json and not verbose)
-    shown = Shown(None if silent else console(sys.stderr), verbose)
+    shown = show.live(wanted=True, every_sweep=verbose)
     course = Course(keep_best, files.dry_run)
 
     def watch(steps: Steps) -> Steps:
@@ -136,7 +133,7 @@ def untangle(
 
     def begin(doing: str) -> None:
         course.begin(doing)
-        _show(shown, doing, files)
+        show_stage(shown, doing, files)
 
     with processes(method, show.threads, watch) if mpi else nullcontext() as root:
         if root and files.source == "-":
@@ -144,7 +141,7 @@ def untangle(
         draw.check()
         courses[:] = [course]
         with shown:
-            _show(shown, READING, files)
+            show_stage(shown, READING, files)
             document, output = open_files(files, held, show.threads, history, cells, *draw.names)
             if cells is not None:
                 check_cells(document, cells)
@@ -161,20 +158,6 @@ def untangle(
             draw.write(report, show.threads)
         show.print(report, report_stream(files), verbose)
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
-
-
-def _show(shown: Shown, doing: str, files: Files) -> None:
-    """Show what is done, where that takes a while; what goes to a stream may go to the terminal."""
-    from meshfix_cli.meshfile.atomic import is_stream
-
-    if doing == READING and is_large(files.source):
-        shown.show(f"reading {files.source}")
-    elif doing == WRITING and (files.dry_run or is_stream(files.target)):
-        shown.hide()
-    elif doing == WRITING:
-        shown.show(f"writing {files.target}")
-    elif doing == JUDGING:
-        shown.show("measuring the quality")
 
 
 def _displaced(

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from commands import POSIX, TANGLED, lines_of, on_terminal, run
+from commands import POSIX, TANGLED, VALID, lines_of, on_terminal, run
 from places import SAMPLES
 
 # The command, which waits where it is told to, until there is a file.
@@ -112,6 +112,20 @@ def test_reading_and_writing_are_shown(tmp_path: Path) -> None:
         terminal.until(f"writing {out}")
         (tmp_path / "go").touch()
         assert "measuring the quality" in terminal.rest()
+
+
+@POSIX
+@pytest.mark.parametrize("words", [("quality", "--all"), ("perturb", "--percent", "5", "--dist", "h")])
+def test_other_commands_show_what_takes_a_while(words: tuple[str, ...], tmp_path: Path) -> None:
+    fifo = tmp_path / "in.vtk"
+    os.mkfifo(fifo)
+    out = [tmp_path / "o.vtk"] if words[0] == "perturb" else []
+    with on_a_terminal(200, tmp_path / "go", "nowhere", *words, fifo, *out) as terminal:
+        terminal.until(f"reading {fifo}")
+        fifo.write_bytes(Path(VALID).read_bytes())
+        shown = terminal.rest()
+    assert "measuring the quality" in shown
+    assert shown.rindex("\x1b[2K") < shown.index("332 triangles")
 
 
 @POSIX

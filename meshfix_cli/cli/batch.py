@@ -28,8 +28,9 @@ from meshfix_cli.cli.options import (
     solving,
     storing,
 )
-from meshfix_cli.cli.process import SOME_FAILED, VALID, abort_all, complain, cores, find_processes, helpers
+from meshfix_cli.cli.process import SOME_FAILED, VALID, abort_all, complain, cores, courses, find_processes, helpers
 from meshfix_cli.errors import WriteError
+from meshfix_cli.mesh.elements import counted
 from meshfix_cli.repair import Files, Held, Judge, Method
 
 if TYPE_CHECKING:
@@ -111,6 +112,22 @@ def _make_folder(folder: str) -> None:
         raise WriteError(f"{folder}: {what}") from error
     if not os.access(folder, os.W_OK):
         raise WriteError(f"{folder}: is not writable")
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """How far a batch is."""
+
+    tally: Tally
+    total: int
+
+    def hears(self) -> bool:
+        """A batch is resumed rather than kept."""
+        return False
+
+    def ended(self) -> str:
+        """Say how many files are done."""
+        return f"interrupted, {self.tally.statuses.total():,} of {counted(self.total, 'file', 'files')} done"
 
 
 @dataclass(frozen=True)
@@ -229,6 +246,7 @@ def batch(
         judge = Judge(show.metrics, requirements, brief=show.quiet and not listed.reports)
         task = Task(files, held, method, judge, resume)
         passed, done, tally = True, {}, Tally()
+        courses[:] = [_Counted(tally, len(pairs))]
         try:
             for result in _told(run(executor, (task.at(*pair) for pair in pairs), in_flight), len(pairs), show, tally):
                 passed &= _passes(result, allow_inverted)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, NoReturn, TextIO, cast
+from typing import IO, TYPE_CHECKING, Any, NoReturn, Protocol, TextIO, cast
 
 import click
 
@@ -22,7 +22,6 @@ from meshfix_cli.report.plain import plain
 if TYPE_CHECKING:
     from mpi4py.MPI import Intracomm
 
-    from meshfix_cli.cli.course import Course
     from meshfix_cli.repair import Method, Steps
     from meshfix_cli.workers.distributed import Root
 
@@ -37,8 +36,20 @@ LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "MV2_COMM_WORLD_SIZE", "PMI_SIZE", "SLURM_ST
 
 # Processes that work for this one, and end with it.
 helpers: set[str] = set()
+
+
+class Told(Protocol):
+    """A run that tells how far it is."""
+
+    def hears(self) -> bool:
+        """Take a signal; False: the run is to be ended."""
+
+    def ended(self) -> str:
+        """Say how far it was when it was ended."""
+
+
 # The run that is under way, where it is to be told how far it was when a signal ended it.
-courses: list[Course] = []
+courses: list[Told] = []
 # Streams that the shell has closed.
 closed: set[str] = set()
 

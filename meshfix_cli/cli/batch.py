@@ -121,9 +121,9 @@ class _Counted:
     tally: Tally
     total: int
 
-    def hears(self) -> bool:
-        """A batch is resumed rather than kept."""
-        return False
+    def hears(self) -> str:
+        """Let it be ended: a batch is resumed."""
+        return ""
 
     def ended(self) -> str:
         """Say how many files are done."""

@@ -56,12 +56,15 @@ class Course:
         self.doing = doing
         self.elements = self.elements if elements is None else elements
 
-    def hears(self) -> bool:
-        """Take a signal; False: the run is to be ended."""
+    def hears(self) -> str:
+        """Take a signal, and say what follows; nothing: the run is to be ended."""
         if not self._keep_best or self.asked or self.doing == READING:  # there is nothing better than the input
-            return False
+            return ""
         self.asked = True
-        return True
+        kept = (
+            "the best mesh so far is kept once this sweep is done" if self.doing == SOLVING else "OUTPUT is completed"
+        )
+        return f"{kept}; a second signal ends it without that"
 
     def ended(self) -> str:
         """Say how far it was when it was ended."""

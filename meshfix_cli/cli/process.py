@@ -41,8 +41,8 @@ helpers: set[str] = set()
 class Told(Protocol):
     """A run that tells how far it is."""
 
-    def hears(self) -> bool:
-        """Take a signal; False: the run is to be ended."""
+    def hears(self) -> str:
+        """Take a signal, and say what follows; nothing: the run is to be ended."""
 
     def ended(self) -> str:
         """Say how far it was when it was ended."""
@@ -188,8 +188,8 @@ def _stop(number: int, frame: object) -> None:
     """
     del frame
     told = courses[-1] if courses and number != getattr(signal, "SIGHUP", None) else None
-    if told is not None and told.hears():
-        _say_at_once("the best mesh so far is kept once this sweep is done; a second signal ends it without that")
+    if told is not None and (follows := told.hears()):
+        _say_at_once(follows)
         return
     signal.signal(number, signal.SIG_IGN)
     for stream in (sys.stdout, sys.stderr):  # a live line hides the cursor

@@ -117,6 +117,18 @@ def test_the_best_mesh_so_far_is_kept(name: str, steps: int, inverted: int, code
 
 
 @POSIX
+def test_what_is_being_written_is_completed(tmp_path: Path) -> None:
+    """The disk is asked again and again whether a signal has come."""
+    slow = SLOW_DISK.replace("time.sleep(60)", "while not courses[-1].asked: time.sleep(0.01)")
+    slow = f"from meshfix_cli.cli.process import courses{slow}"
+    with start(slow, "untangle", "-q", "--keep-best", TANGLED, tmp_path / "out.vtk") as child:
+        child.send_signal(signal.SIGINT)
+        assert told(child) == ["meshfix: OUTPUT is completed; a second signal ends it without that"]
+    assert child.returncode == 0
+    assert read(tmp_path / "out.vtk").mesh.check()[0] == 0
+
+
+@POSIX
 def test_a_second_signal_ends_a_run_that_would_keep_its_best(tmp_path: Path) -> None:
     with start(WAITS, 2, "", *US, "--keep-best", TANGLED, tmp_path / "out.vtk") as child:
         assert child.stderr is not None

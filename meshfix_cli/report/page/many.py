@@ -12,7 +12,7 @@ from meshfix_cli.report.page.parts import hash_of, made, shown, table
 from meshfix_cli.report.tally import STATUSES, Tally, why
 
 WORST_FIRST = ("invalid", "valid", "skipped")
-COLUMNS = ("file", "outcome", "elements", "inverted", "after", "smallest angle or scaled Jacobian", "after", "seconds")
+COLUMNS = ("file", "outcome", "elements", "inverted", "still", "smallest angle or scaled Jacobian", "after", "seconds")
 
 Kept = Mapping[str, Any]
 

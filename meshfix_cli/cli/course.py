@@ -86,10 +86,11 @@ class Course:
                 first = best = step
             if record.sweep or self._last is None:
                 self._last = record
-            if self._keep_best:
+            able = self._keep_best and _may_end(mesh, first[0])
+            if able:
                 best = min(best, step, key=lambda one: one[1].rank)
             yield step
-            if self.asked and _may_end(mesh, first[0]):
+            if self.asked and able:
                 self._stopped = self._stopped or self._last
                 yield from _best(first, best, step)
                 return

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bent import curved, mesh_of, straight
 from commands import MESHFIX, POSIX, SLOW_DISK, TANGLED, error_line, run, start
 from places import SAMPLES
 
@@ -186,6 +187,20 @@ def test_what_is_kept_is_never_worse_than_the_input() -> None:
         kept = followed(Course(keep_best=True, dry_run=False), [*steps, steps[-1]], len(steps) - 1)
         assert kept[-1][0].points.tobytes() == best.points.tobytes()
         assert kept[-1][1].inverted == best.check()[0]
+
+
+@pytest.mark.parametrize("key", ["triangle6", "tetra10"])
+def test_curved_meshes_are_kept_wherever_they_are_interrupted(key: str) -> None:
+    """Also where straight elements are untangled first, whose records do not tell of curved ones."""
+    quadratic, points, free = curved(key, 0.8)
+    corners = free & quadratic.corners
+    points = points + 0.5 * np.random.default_rng(1).uniform(-1, 1, points.shape) * corners[:, None]
+    mesh = mesh_of(quadratic, points, key, straight(key)[1], free)
+    run = list(Method()._curved_steps(mesh, np.inf, 1))
+    assert run[0][1].inverted == mesh.check()[0] > 0
+    for after in range(len(run)):
+        kept = followed(Course(keep_best=True, dry_run=False), run, after)[-1]
+        assert kept[0].check()[0] <= min(mesh.check()[0], run[min(after + 1, len(run) - 1)][0].check()[0])
 
 
 def test_keeping_the_best_and_many_processes_exclude_each_other(tmp_path: Path) -> None:

@@ -67,11 +67,9 @@ def is_large(source: str) -> bool:
 
 def show_stage(shown: Shown, doing: str, files: Files) -> None:
     """Show what is done, where that takes a while; what goes to a stream may go to the terminal."""
-    from meshfix_cli.meshfile.atomic import is_stream
-
     if doing == READING and is_large(files.source):
         shown.show(f"reading {files.source}")
-    elif doing == WRITING and (files.dry_run or is_stream(files.target)):
+    elif doing == WRITING and (files.dry_run or _is_streamed(files.target)):
         shown.hide()
     elif doing == WRITING:
         shown.show(f"writing {files.target}")
@@ -81,10 +79,13 @@ def show_stage(shown: Shown, doing: str, files: Files) -> None:
 
 def report_stream(files: Files) -> Any:
     """Return stdout, or stderr where the mesh goes to stdout, or to a pipe or device that stdout may be."""
+    return sys.stderr if _is_streamed(files.target) and not files.dry_run else sys.stdout
+
+
+def _is_streamed(target: str) -> bool:
     from meshfix_cli.meshfile.atomic import is_stream
 
-    streamed = is_stream(files.target) and not Path(files.target).is_dir()  # which a case of OpenFOAM is
-    return sys.stderr if streamed and not files.dry_run else sys.stdout
+    return is_stream(target) and not Path(target).is_dir()  # which a case of OpenFOAM is
 
 
 def given(*names: str | None) -> list[str]:

@@ -56,3 +56,7 @@ def __getattr__(name: str) -> object:
     from importlib import import_module
 
     return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:  # what completes a name in Python
+    return sorted({*globals(), *__all__})

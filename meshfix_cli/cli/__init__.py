@@ -34,7 +34,7 @@ EXAMPLES = (
     cls=Group,
     commands=Commands(),
     examples=EXAMPLES,
-    short_help="Repair tangled meshes of linear elements.",
+    short_help="Repair tangled meshes.",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.option(
@@ -46,10 +46,10 @@ EXAMPLES = (
     help="Show the version, and what it runs with.",
 )
 def main() -> None:
-    """Repair tangled meshes of linear elements, plane or solid, by moving interior vertices.
+    """Repair tangled meshes by moving vertices: solids, plane meshes and surfaces, of straight or curved elements.
 
-    INPUT and OUTPUT are files, of any format and also in .gz, or - for stdin and stdout; a .pvtu stands for its pieces,
-    and 'mesh_*.msh', in quotes, for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error (OUTPUT, or a file
-    beside it, was not written), 2 wrong usage, 3 inverted elements remain, the fixed boundary crosses itself or a
-    --require is not met, 4 some of several meshes cannot be read or, in a batch, are not valid.
+    INPUT and OUTPUT are files, of more than 40 formats and also in .gz, or - for stdin and stdout; a .pvtu stands for
+    its pieces, and 'mesh_*.msh', in quotes, for the parts of a mesh. Exit codes: 0 the mesh is valid, 1 an error
+    (OUTPUT, or a file beside it, was not written), 2 wrong usage, 3 inverted elements remain, the fixed boundary
+    crosses itself or a --require is not met, 4 some of several meshes cannot be read or, in a batch, are not valid.
     """

@@ -101,6 +101,12 @@ class Group(WithExamples, click.Group):
         finally:
             _flush(sys.stderr)
 
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """Find the command; where a file stands in its place, say what is missing."""
+        if args[0] not in self.commands and Path(args[0]).exists():
+            ctx.fail(f"{args[0]!r} is a file, and no command. Did you mean 'meshfix untangle'?")
+        return super().resolve_command(ctx, args)
+
     def make_context(self, *arguments: Any, **more: Any) -> click.Context:
         """Read the command line."""
         with _in_plain_words():

@@ -26,7 +26,8 @@ _T = TypeVar("_T", bound=np.generic)
 # Squares and sixth powers of lengths must neither overflow nor vanish in double precision.
 LARGEST_COORDINATE = 1e45
 SMALLEST_SIZE = 1e-45
-ON_BOUNDARY = "on the boundary"  # why a vertex is fixed, where nobody asked for it
+# Why a vertex is fixed, where nobody asked for it; of interfaces the name of the regions follows.
+ON_BOUNDARY, BETWEEN = "on the boundary", "between regions of"
 
 
 @dataclass(frozen=True, eq=False, repr=False)

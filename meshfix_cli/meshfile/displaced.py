@@ -25,13 +25,8 @@ def displaced(document: Document, name: str) -> Document:
         A coordinate is too large for the numbers of the file.
     """
     with naming(document.name):
-        arrays, original, mesh = document.source.arrays.point, document.source.points, document.mesh
-        vectors = np.asarray(arrays.get(name, ()))
-        fits = vectors.ndim == 2 and len(vectors) == len(original) and original.shape[1] <= vectors.shape[1] <= 3
-        if not fits or vectors.dtype.kind not in "fiu":
-            known = listed(sorted(key for key, values in arrays.items() if np.ndim(values) == 2)) or "none"
-            raise ReadError(f"there is no vector for each point named {name!r} (found: {known})")
-        vectors = vectors[:, : original.shape[1]].astype(np.float64)
+        original, mesh = document.source.points, document.mesh
+        vectors = _vectors(document, name)[:, : original.shape[1]]
         if not np.isfinite(vectors[mesh.used]).all():
             raise ReadError(f"{name} has vectors that are not finite")
         if document.basis is not None:
@@ -40,6 +35,23 @@ def displaced(document: Document, name: str) -> Document:
                 raise ReadError(f"{name} moves points out of the plane of the mesh")
         points = document.source.rounded((original + vectors).astype(original.dtype))
         return replace(document, mesh=document.in_plane(points.astype(np.float64), mesh), displaced=points)
+
+
+def _vectors(document: Document, name: str) -> NDArray[np.float64]:
+    """Return the vectors (n, 2 or 3) of an array; in a plane of constant z two components are enough."""
+    arrays, original = document.source.arrays.point, document.source.points
+    if name not in arrays:
+        known = listed(sorted(key for key, values in arrays.items() if np.ndim(values) == 2)) or "none"
+        raise ReadError(f"there is no point data named {name!r} (vectors: {known})")
+    vectors = np.asarray(arrays[name])
+    columns = vectors.shape[1] if vectors.ndim == 2 else 1
+    level = document.basis is not None and bool((document.basis == np.eye(3)[:2]).all())
+    least = 2 if level else original.shape[1]
+    if not least <= columns <= 3 or vectors.dtype.kind not in "fiu" or len(vectors) != len(original):
+        needed = f"{'2 or ' * (least == 2)}3 numbers for each point"
+        raise ReadError(f"the point data {name!r} are no vectors, {needed}: there are {columns}")
+    missing = np.zeros((len(vectors), max(original.shape[1] - columns, 0)))
+    return np.column_stack([vectors, missing]).astype(np.float64)
 
 
 def places_in(reference: Document, document: Document, threads: int = 1) -> NDArray[np.float64]:

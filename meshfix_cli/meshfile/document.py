@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
 from meshfix_cli.mesh.elements import counted, dimension_of
-from meshfix_cli.mesh.mesh import LARGEST_COORDINATE, ON_BOUNDARY, Mesh, mask_of
+from meshfix_cli.mesh.mesh import BETWEEN, LARGEST_COORDINATE, ON_BOUNDARY, Mesh, mask_of
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import first_of_each_place
 from meshfix_cli.meshfile.notes import concave, notes_on
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 FREE = "none"  # the name of no array of regions, by which interfaces are freed
 SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
 # Reasons to hold vertices that may slide all the same, where they are asked to.
-BETWEEN, ON_CELLS = "between regions of", "on other cells of the file"
+ON_CELLS = "on other cells of the file"
 CROWDED = "on edges of more than two elements"
 OF_CURVED = "of curved elements"
 HALFWAY = "between corners of other elements"

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import element_of
 from meshfix_cli.mesh.freedom import constraints_of, freedom_of
-from meshfix_cli.mesh.mesh import ON_BOUNDARY
+from meshfix_cli.mesh.mesh import BETWEEN, ON_BOUNDARY
 from meshfix_cli.meshfile.coincident import first_of_each_place
-from meshfix_cli.meshfile.document import BETWEEN, ON_CELLS, Document
+from meshfix_cli.meshfile.document import ON_CELLS, Document
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.curved import Smooth

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.mesh import ON_BOUNDARY
+from meshfix_cli.mesh.mesh import BETWEEN, ON_BOUNDARY
 from meshfix_cli.mesh.sides import Kept
 from meshfix_cli.mesh.surface import laid_out
-from meshfix_cli.meshfile.document import BETWEEN, CROWDED, ON_CELLS, Document
+from meshfix_cli.meshfile.document import CROWDED, ON_CELLS, Document
 from meshfix_cli.meshfile.sliding import CellsBeside, joint, twins
 
 if TYPE_CHECKING:

@@ -259,7 +259,8 @@ def _writable(form: Format, target: str) -> Format:
     if form.name == "ugrid" and not re.search(r"\.l?[br](?:4|8)l?\.ugrid$", name):  # meshio writes numpy's repr
         raise WriteError(f"{target}: text files of UGRID cannot be written; name a .b8.ugrid")
     if form.name not in formats.writers():
-        raise WriteError(f"{target}: the format {form.name} cannot be written")
+        others = ", ".join(sorted(anew.WRITERS))
+        raise WriteError(f"{target}: the format {form.name} cannot be made of another; among those that can: {others}")
     return form
 
 

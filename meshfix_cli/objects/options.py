@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from difflib import get_close_matches
 from functools import partial
 from numbers import Integral, Real
 from typing import Any, TypedDict
@@ -74,7 +75,10 @@ def method_of(options: Mapping[str, Any]) -> Method:
     """
     for name in options:
         if name not in _READ:
-            raise OptionError(f"there is no option {name!r}; there are {', '.join(_READ)}")
+            known = sorted({*_READ, *Options.__annotations__, "reference"})
+            near = get_close_matches(name, known, 1)
+            told = f": did you mean {near[0]!r}?" if near else f"; there are {', '.join(known)}"
+            raise OptionError(f"there is no option {name!r}{told}")
     return Method(**{name: _READ[name](name, value) for name, value in options.items()})
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.mesh.elements import JUDGED, MIXED, Shape, counted, role, straight_key, words
-from meshfix_cli.mesh.mesh import ON_BOUNDARY, Mesh
+from meshfix_cli.mesh.mesh import BETWEEN, ON_BOUNDARY, Mesh
 from meshfix_cli.quality.metrics import having, types_with
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import BIN_WIDTH, JACOBIAN_BINS, Summary
@@ -353,6 +353,10 @@ def _impossible(report: Report) -> Iterator[str]:
         if count := len(pairs):
             places = counted(count, "place", "places")
             yield f"IMPOSSIBLE: {what_is_fixed(report.fixed)} {what} in {places} ({_some_pairs(report, pairs)})"
+    between = {reason: count for reason, count in report.fixed.items() if reason.startswith(BETWEEN)}
+    if between and (len(found.inverted) or len(found.exclusive) or len(found.crossing)):
+        held = " and ".join(f"{count:,} {reason}" for reason, count in between.items())
+        yield f"among the fixed vertices are {held}: --regions none lets them move"
     if len(found.overlapping):
         yield f"IMPOSSIBLE: separate parts of the mesh overlap ({_some(report, found.overlapping)})"
 

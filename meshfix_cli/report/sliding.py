@@ -50,4 +50,5 @@ def _gain(gain: Mapping[str, Any], report: Report) -> str:
     ceiling = "there would be no ceiling"
     if gain["ceiling"] is not None:
         ceiling = f"the ceiling would be {gain['ceiling']:.3f}{unit}"
-    return f"with --slide flat {could}, and {ceiling}"
+    option = "--slide flat" if report.command == "untangle" else "untangle --slide flat"
+    return f"with {option} {could}, and {ceiling}"

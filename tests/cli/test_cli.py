@@ -110,6 +110,11 @@ def test_output_format_by_name_and_by_extension(tmp_path: Path) -> None:
     assert run("untangle", "--quiet", "--format", "gmsh22", TANGLED).stdout.startswith(b"$MeshFormat\n2.2")
 
 
+def test_a_file_in_the_place_of_a_command() -> None:
+    line = error_line(TANGLED, "out.vtk", code=2)
+    assert line == f"Error: {TANGLED!r} is a file, and no command. Did you mean 'meshfix untangle'?"
+
+
 def test_the_data_of_another_file_name_that(tmp_path: Path) -> None:
     (tmp_path / "mesh.h5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(64))
     (tmp_path / "mesh.xdmf").touch()
@@ -367,37 +372,6 @@ def test_one_unreadable_mesh_does_not_stop_the_others(tmp_path: Path) -> None:
     assert "plate.vtk" in done.stdout.decode()
     assert "plate_tangled.vtk" in done.stdout.decode()
     assert done.stderr.decode().count("\n") == 1
-
-
-def test_elements_that_nothing_can_mend_are_counted(tmp_path: Path) -> None:
-    mesh = meshio.read(VALID)
-    document = read(VALID)
-    simplices = document.mesh.topology.simplices
-    a, b, c = simplices[~document.mesh.movable[simplices].any(axis=1)][0]
-    mesh.points[a] = mesh.points[b] + mesh.points[c] - mesh.points[a]
-    mesh.write(tmp_path / "in.vtk")
-    text = run("untangle", tmp_path / "in.vtk", tmp_path / "out.vtk", code=3).stdout.decode()
-    stuck = json.loads(run("quality", "--json", tmp_path / "in.vtk", code=3).stdout)["obstacles"]["inverted"]
-    assert f"IMPOSSIBLE: {len(stuck)} of them without a free vertex" in text
-    assert str(stuck[0]) in text
-    run("untangle", "--allow-inverted", tmp_path / "in.vtk", tmp_path / "out.vtk")
-
-
-def test_a_boundary_that_crosses_itself_is_no_success(tmp_path: Path) -> None:
-    """The left half of the plate moved onto the right one; what is left valid is not called valid."""
-    mesh = meshio.read(VALID)
-    held = ~read(VALID).mesh.movable
-    hole = held & (np.linalg.norm(mesh.points[:, :2] - [0.8, 1.25], axis=1) < 0.4)
-    mesh.points[hole, 1] += 0.6
-    mesh.write(tmp_path / "in.vtk")
-    for command in (["quality"], ["untangle", "--sweeps", "20"]):
-        output = [tmp_path / "out.vtk"] if command[0] == "untangle" else []
-        text = run(*command, tmp_path / "in.vtk", *output, code=3).stdout.decode()
-        assert "IMPOSSIBLE: the fixed boundary crosses itself in " in text
-        assert "valid: no element" not in text
-        facts = json.loads(run(*command, "--json", tmp_path / "in.vtk", *output, code=3).stdout)
-        assert not facts["valid"]
-        assert len(facts["obstacles"]["crossing"]) >= 2
 
 
 def test_vertices_stay_near(tmp_path: Path) -> None:

@@ -120,7 +120,10 @@ def test_what_fix_holds_does_not_slide(tmp_path: Path) -> None:
 
 def test_the_report_tells_what_sliding_would_gain(tmp_path: Path) -> None:
     said = " ".join(run("quality", SAMPLES / "bracket.vtk").stdout.decode().split())
-    assert "note: with --slide flat 1,263 instead of 861 vertices could move, and the ceiling would be 22.214°" in said
+    assert (
+        "note: with untangle --slide flat 1,263 instead of 861 vertices could move, and the ceiling would be 22.214°"
+        in said
+    )
     done = run("untangle", "--slide", "flat", SAMPLES / "bracket_tangled.vtk", tmp_path / "out.vtk")
     said = " ".join(done.stdout.decode().split())
     assert "with --slide" not in said

@@ -157,7 +157,8 @@ def test_options_are_those_of_the_command_line(tmp_path: Path) -> None:
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "unknown": ({"smoth": 3}, "there is no option 'smoth'; there are strategy, sweeps, smooth"),
+    "unknown": ({"smoth": 3}, "there is no option 'smoth': did you mean 'smooth'?"),
+    "unlike all": ({"xyz": 3}, "there is no option 'xyz'; there are .*smooth.*threads"),
     "strategy": ({"strategy": "XX"}, "strategy is one of auto, LS, US"),
     "smooth": ({"smooth": "worst"}, "from 0 to 1,000,000, or 'auto', or 'best', and not 'worst'"),
     "sweeps": ({"sweeps": 1.5}, "sweeps is a whole number from 0 on"),
@@ -176,7 +177,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "fixed": ({"fixed": [2000]}, "meshio.Mesh: fixed names vertex 2000, and there are those from 0 to 1862"),
     "fixed by numbers": ({"fixed": [0.5]}, r"fixed is an array of shape \(1,\) and type float64, and neither a mask"),
     "fix": ({"fix": "wall"}, "meshio.Mesh: there is no point data, set or group named 'wall'"),
-    "displace": ({"displace": "u"}, "meshio.Mesh: there is no vector for each point named 'u'"),
+    "displace": ({"displace": "u"}, "meshio.Mesh: there is no point data named 'u'"),
 }
 
 
@@ -284,6 +285,17 @@ def test_a_plane_mesh_is_not_displaced_out_of_its_plane() -> None:
         untangle(here, displace="u")
     here.point_data["u"] = np.ones_like(flat) * [1, 2, 0]
     np.testing.assert_array_equal(untangle(here, displace="u").points, flat + np.array([1, 2, 0]))
+    here.point_data["u"] = here.point_data["u"][:, :2].copy()
+    np.testing.assert_array_equal(untangle(here, displace="u").points, flat + np.array([1, 2, 0]))
+    here.point_data["u"] = np.ones(len(flat))
+    with pytest.raises(
+        MeshfixError, match="the point data 'u' are no vectors, 2 or 3 numbers for each point: there are 1"
+    ):
+        untangle(here, displace="u")
+
+
+def test_all_public_names_are_among_those_that_a_shell_completes() -> None:
+    assert {*meshfix_cli.__all__} <= {*dir(meshfix_cli)}
 
 
 def test_a_repairer_builds_the_mesh_once(monkeypatch: pytest.MonkeyPatch) -> None:

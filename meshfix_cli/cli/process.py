@@ -198,10 +198,9 @@ def _stop(number: int, frame: object) -> None:
         _say_at_once(follows)
         return
     signal.signal(number, signal.SIG_IGN)
-    for stream in (sys.stdout, sys.stderr):  # a live line hides the cursor
-        with suppress(OSError, ValueError):
-            if stream.isatty():
-                os.write(stream.fileno(), b"\x1b[?25h")
+    with suppress(OSError, ValueError):  # a live line hides the cursor
+        if sys.stderr.isatty():
+            os.write(sys.stderr.fileno(), f"{CLEAR}\x1b[?25h".encode())
     if told is not None:
         _say_at_once(told.ended())
     atomic = sys.modules.get("meshfix_cli.meshfile.atomic")

@@ -33,7 +33,10 @@ class Line:
         self._start, self._what = time.monotonic(), ""
         self._share: float | None = None
         self._spinner, self._wide = Spinner("dots"), out.width >= NARROW
-        self._live = Live(console=out, get_renderable=self._row, refresh_per_second=A_SECOND, transient=True)
+        self._live = Live(
+            console=out, get_renderable=self._row, refresh_per_second=A_SECOND, transient=True,
+            redirect_stdout=False, redirect_stderr=False,  # older releases put there what is no terminal
+        )  # fmt: skip
 
     def show(self, what: str, share: float | None = None) -> None:
         """Show what is done, and which share of it, where that is known."""

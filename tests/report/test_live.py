@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import io
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,8 +13,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from commands import POSIX, TANGLED, VALID, lines_of, on_terminal, run
+from commands import ANSI, POSIX, TANGLED, VALID, lines_of, on_terminal, run
 from places import SAMPLES
+from rich.console import Console
+
+from meshfix_cli.report.live import Line
 
 # The command, which waits where it is told to, until there is a file.
 WAITS = """
@@ -41,7 +46,7 @@ main(sys.argv[3:])
 
 
 @contextmanager
-def on_a_terminal(columns: int, go: Path, where: object, *arguments: object) -> Iterator[Terminal]:
+def on_a_terminal(columns: int, go: Path, where: object, *arguments: object, code: int = 0) -> Iterator[Terminal]:
     pty = pytest.importorskip("pty")
     master, slave = pty.openpty()
     child = subprocess.Popen(
@@ -50,8 +55,8 @@ def on_a_terminal(columns: int, go: Path, where: object, *arguments: object) -> 
     )  # fmt: skip
     os.close(slave)
     try:
-        yield Terminal(master)
-        assert child.wait(timeout=60) == 0
+        yield Terminal(master, child.pid)
+        assert child.wait(timeout=60) == code
     finally:
         child.kill()
         child.wait()
@@ -61,7 +66,8 @@ def on_a_terminal(columns: int, go: Path, where: object, *arguments: object) -> 
 class Terminal:
     """What is shown there."""
 
-    def __init__(self, master: int) -> None:
+    def __init__(self, master: int, process: int) -> None:
+        self.process = process
         self._master, self._shown = master, b""
 
     def until(self, words: str) -> list[str]:
@@ -126,6 +132,26 @@ def test_other_commands_show_what_takes_a_while(words: tuple[str, ...], tmp_path
         shown = terminal.rest()
     assert "measuring the quality" in shown
     assert shown.rindex("\x1b[2K") < shown.index("332 triangles")
+
+
+@POSIX
+def test_nothing_is_left_of_the_line_where_a_signal_ends_a_command(tmp_path: Path) -> None:
+    fifo = tmp_path / "in.vtk"
+    os.mkfifo(fifo)
+    with on_a_terminal(200, tmp_path / "go", "nowhere", "quality", fifo, code=130) as terminal:
+        terminal.until(f"reading {fifo}")
+        os.kill(terminal.process, signal.SIGINT)
+        shown = terminal.rest()
+    assert ANSI.sub("", shown[shown.rindex("\x1b[2K") :]) == ""
+    assert shown.rindex("\x1b[?25h") > shown.rindex("\x1b[?25l")
+
+
+def test_the_line_leaves_streams_alone() -> None:
+    """Whether they are terminals is asked while it is shown."""
+    line, streams = Line(Console(file=io.StringIO(), force_terminal=True)), (sys.stdout, sys.stderr)
+    line.show("reading")
+    assert (sys.stdout, sys.stderr) == streams
+    line.hide()
 
 
 @POSIX

@@ -61,9 +61,10 @@ class Course:
         if not self._keep_best or self.asked or self.doing == READING:  # there is nothing better than the input
             return ""
         self.asked = True
-        kept = (
-            "the best mesh so far is kept once this sweep is done" if self.doing == SOLVING else "OUTPUT is completed"
-        )
+        kept = "the best mesh so far is kept once this sweep is done"
+        if self.doing != SOLVING:
+            writes = self.doing == WRITING and not self._dry_run
+            kept = f"{'OUTPUT' if writes else 'the report'} is completed"
         return f"{kept}; a second signal ends it without that"
 
     def ended(self) -> str:

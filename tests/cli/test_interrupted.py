@@ -17,7 +17,7 @@ from commands import MESHFIX, POSIX, SLOW_DISK, TANGLED, error_line, run, start
 from places import SAMPLES
 
 from meshfix_cli import Mesh, read
-from meshfix_cli.cli.course import SOLVING, Course
+from meshfix_cli.cli.course import JUDGING, SOLVING, WRITING, Course
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.records import SweepRecord
 
@@ -127,6 +127,17 @@ def test_what_is_being_written_is_completed(tmp_path: Path) -> None:
         assert told(child) == ["meshfix: OUTPUT is completed; a second signal ends it without that"]
     assert child.returncode == 0
     assert read(tmp_path / "out.vtk").mesh.check()[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("doing", "dry_run", "what"),
+    [(WRITING, False, "OUTPUT"), (JUDGING, False, "the report"), (WRITING, True, "the report")],
+)
+def test_what_is_said_to_be_completed_is_what_is_not_there_yet(doing: str, dry_run: bool, what: str) -> None:
+    course = Course(keep_best=True, dry_run=dry_run)
+    course.begin(doing)
+    assert course.hears() == f"{what} is completed; a second signal ends it without that"
+    assert course.hears() == ""
 
 
 @POSIX

@@ -292,7 +292,7 @@ def mask_of(fixed: ArrayLike, n: int) -> NDArray[np.bool_]:
     if given.size == 0:  # of an empty list numpy makes numbers with a point
         return mask
     if given.dtype == bool and given.shape == mask.shape:
-        return given
+        return given.copy()  # whoever has given it may change it
     if given.ndim != 1 or given.dtype.kind not in "iu":
         what = f"an array of shape {given.shape} and type {given.dtype}"
         raise InvalidMeshError(f"fixed is {what}, and neither a mask ({n},) of bool nor indices of vertices")

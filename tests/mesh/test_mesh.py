@@ -16,7 +16,7 @@ from meshes import tangle
 
 from meshfix_cli import kernels, untangle
 from meshfix_cli.errors import InvalidMeshError
-from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.mesh import Mesh, mask_of
 from meshfix_cli.quality.summary import summarise
 
 SQUARE: list[list[float]] = [[0, 0], [1, 0], [1, 1], [0, 1], [0.4, 0.6]]
@@ -242,6 +242,13 @@ def test_vertices_are_fixed_by_a_mask_or_by_their_indices(bracket: Mesh) -> None
         np.testing.assert_array_equal(Mesh.build(bracket.points, cells, fixed).movable, bracket.movable & ~mask)
     for nothing in (np.array([]), np.zeros(n, dtype=bool), None):
         np.testing.assert_array_equal(Mesh.build(bracket.points, cells, nothing).movable, bracket.movable)
+
+
+def test_a_mask_may_be_changed_once_it_is_given() -> None:
+    mask = np.array([True, False])
+    held = mask_of(mask, 2)
+    mask[:] = False
+    assert held.tolist() == [True, False]
 
 
 @pytest.mark.parametrize(("fixed", "words"), [

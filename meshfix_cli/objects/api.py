@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli.errors import InvalidMeshError, OptionError, WriteError, naming
-from meshfix_cli.mesh.mesh import Mesh, mask_of
+from meshfix_cli.mesh.mesh import Mesh, mask_of, regular
 from meshfix_cli.meshfile.displaced import displaced, places_in
 from meshfix_cli.meshfile.document import Document, build
 from meshfix_cli.meshfile.reading import read
@@ -168,7 +168,7 @@ class Result(Generic[M]):
 
 @overload
 def untangle(  # type: ignore[overload-overlap]
-    mesh: Mesh, strategy: str = "auto", *, reference: Mesh | None = None, **options: Unpack[Options]
+    mesh: Mesh, strategy: str = "auto", *, reference: Any = None, **options: Unpack[Options]
 ) -> Outcome: ...
 @overload
 def untangle(
@@ -232,6 +232,8 @@ def untangle(
             check_reference(option, method)
     if isinstance(mesh, Mesh):
         _check_bare(held != Held() or displace or require or metrics, options)
+        if not (reference is None or isinstance(reference, Mesh)):
+            reference = _document(reference, Held(), None, threads)[0].mesh
         return _of_mesh(_with_fixed(mesh, fixed), method, reference, threads)
     document, kind = _document(mesh, held, fixed, threads)
     moved = document if displace is None else displaced(document, displace)
@@ -365,9 +367,9 @@ class Repairer:
         Raises
         ------
         InvalidMeshError
-            They are of another shape, or not finite.
+            They are no array of numbers, of another shape, or not finite.
         """
-        document = self._at(np.asarray(points))
+        document = self._at(regular(points, "the points are"))
         freed = self._method.freed(document, self._places)
         reach = self._method.reach(document.mesh, self._threads)
         self.outcome = self._method.solve(freed.mesh, reach, self._threads, reference=self._places)

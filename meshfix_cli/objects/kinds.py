@@ -149,7 +149,8 @@ def _are_flat(points: NDArray[np.floating[Any]], rows: NDArray[np.integer[Any]])
 
 
 def _moved_arrays(mesh: Any, points: NDArray[np.floating[Any]]) -> Any:
-    return type(mesh)((points, mesh[1]))
+    moved = points, mesh[1]
+    return mesh._make(moved) if hasattr(mesh, "_make") else type(mesh)(moved)  # a named tuple takes two arguments
 
 
 def _numpy(array: Any) -> Any:

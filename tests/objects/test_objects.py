@@ -6,7 +6,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import elements
 import generate
@@ -253,6 +253,30 @@ def test_a_repairer_of_a_bare_mesh_holds_what_that_holds() -> None:
     np.testing.assert_array_equal(points[150:153], mesh.points[150:153])
 
 
+class Pair(NamedTuple):
+    """What a user calls points and cells."""
+
+    points: Any
+    cells: Any
+
+
+def test_a_named_pair_comes_back_as_one() -> None:
+    points, triangles = generate.plate(0.3)
+    result = untangle(Pair(points, triangles)).mesh
+    assert isinstance(result, Pair)
+    assert result.cells is triangles
+
+
+def test_the_reference_of_a_bare_mesh_is_of_any_kind() -> None:
+    points, triangles = generate.plate(0.3)
+    mesh = Mesh.build(points, triangles)
+    moved = mesh.with_points(points * [1.0, 2.0])
+    expected = untangle(moved, reference=mesh).after.points
+    np.testing.assert_array_equal(untangle(moved, reference=(points, triangles)).after.points, expected)
+    with pytest.raises(MeshfixError, match="114 triangles, and the mesh"):
+        untangle(moved, reference=(points, triangles[1:]))
+
+
 def morph(mesh: Any) -> Any:
     """Bend a bracket by vectors of its points."""
     there = np.zeros_like(mesh.points)
@@ -317,6 +341,9 @@ def test_a_repairer_builds_the_mesh_once(monkeypatch: pytest.MonkeyPatch) -> Non
         repair(mesh.points[1:])
     with pytest.raises(MeshfixError, match="not finite"):
         repair(mesh.points * np.nan)
+    for no_numbers in (mesh.points.astype(str), [[0.0, 1.0], [0.0]], mesh.points * 1j):
+        with pytest.raises(MeshfixError, match="the points are"):
+            repair(no_numbers)
 
 
 def test_a_repairer_gives_elements_their_shapes_back() -> None:

@@ -24,7 +24,7 @@ def lost(source: Source, other: Source) -> tuple[str, ...]:
 
 def _cells(source: Source, other: Source) -> Iterator[str]:
     mine, theirs = _counts(source.cells), _counts(other.cells)
-    yield from (f"{key} cells" for key, count in mine.items() if theirs[key] < count or key not in theirs)
+    yield from (f"{key} cells" for key, count in mine.items() if theirs[key] < count)
 
 
 def _counts(cells: Sequence[Cells]) -> Counter[str]:

@@ -87,6 +87,18 @@ def test_odd_data_arrive_or_are_named(form: Format, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("form", FORMS)
+def test_of_a_type_without_cells_nothing_is_dropped(form: Format, tmp_path: Path) -> None:
+    """As "Triangles 0" of medit, or an empty block of meshio."""
+    source = box()
+    none = np.empty((0, 6), dtype=np.int64)
+    arrays = Arrays(cell={"quality": [np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.empty(0)]})
+    back, dropped = written(
+        replace(source, cells=[*source.cells, Cells("triangle6", none)], load=lambda: arrays), form, tmp_path / "out"
+    )
+    assert {*dropped} == ({"cell data quality"} if "quality" not in back.arrays.cell else set())
+
+
+@pytest.mark.parametrize("form", FORMS)
 def test_cells_of_a_type_that_are_left_out_in_part_are_named(form: Format, tmp_path: Path) -> None:
     ragged: Any = [np.array([0, 1, 2, 3, 4]), np.array([0, 1, 2, 3, 4, 0])]
     source = box()

@@ -9,6 +9,7 @@ Source: L. A. Schoof, V. R. Yarberry, "EXODUS II: a finite element data model", 
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -272,7 +273,7 @@ def _columns(fields: Mapping[str, Sequence[NDArray[Any]]]) -> Iterator[tuple[str
     for name, runs in fields.items():
         if any(values.dtype.kind not in "biuf" for values in runs):
             continue
-        tables = [values.reshape(len(values), -1).astype(np.float64) for values in runs]
+        tables = [values.reshape(len(values), math.prod(values.shape[1:])).astype(np.float64) for values in runs]
         columns = tables[0].shape[1] if tables else 0
         ends = "xyz" if columns in (2, 3) else range(1, columns + 1)
         for i, end in zip(range(columns), ends, strict=False):

@@ -17,7 +17,8 @@ from tempfile import TemporaryDirectory
 import tomllib
 
 ROOT = Path(__file__).parents[1]
-SETTINGS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+VERSION, SETTINGS = PROJECT["project"]["version"], PROJECT["tool"]
 STABLE = SETTINGS["scikit-build"]["wheel"]["py-api"]  # the first Python that shares its wheel with those that follow
 TESTS = SETTINGS["cibuildwheel"]["test-command"].replace("{project}", str(ROOT))
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
@@ -34,10 +35,11 @@ def version(python: str) -> tuple[int, ...]:
 
 
 def made(python: str, tag: str, folder: Path) -> Path:
-    """Return the wheel with a tag, which is made where it is missing."""
-    if not list(folder.glob(f"*-{tag}-*.whl")):
+    """Return the wheel of this version with a tag, which is made where it is missing."""
+    name = f"*-{VERSION}-{tag}-*.whl"
+    if not list(folder.glob(name)):
         subprocess.run([python, *PIP, "wheel", "--no-deps", "--wheel-dir", folder, ROOT], check=True)
-    (wheel,) = folder.glob(f"*-{tag}-*.whl")
+    (wheel,) = folder.glob(name)
     return wheel
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -70,6 +71,16 @@ def test_wheels_are_made_for_every_python(project: dict[str, Any]) -> None:
     assert built == [f"cp3{minor}-*" for minor in range(oldest, stable + 1)]
     tests = project["tool"]["cibuildwheel"]["test-command"]
     assert all(Path(word.replace("{project}", str(ROOT))).exists() for word in tests.split() if "{project}" in word)
+
+
+def test_a_wheel_of_an_older_version_is_none_of_this(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("tomllib")
+    monkeypatch.syspath_prepend(ROOT / "packages")
+    wheels = import_module("wheels")
+    (tmp_path / "meshfix_cli-0.1.0-cp312-abi3-linux_x86_64.whl").touch()
+    new = tmp_path / f"meshfix_cli-{meshfix_cli.__version__}-cp312-abi3-linux_x86_64.whl"
+    monkeypatch.setattr(wheels.subprocess, "run", lambda *_, **__: new.touch())
+    assert wheels.made("python3", "cp312-abi3", tmp_path) == new
 
 
 def test_the_image_is_made_as_its_linter_likes_it() -> None:

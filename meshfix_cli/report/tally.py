@@ -67,6 +67,13 @@ def before_and_after(result: Mapping[str, Any]) -> tuple[dict[str, Any] | None, 
     return stages.get("before"), next(reversed(stages.values()), None)
 
 
+def smallest(summary: Mapping[str, Any]) -> str:
+    """Return the smallest angle or, where elements are not all simplices, scaled Jacobian."""
+    if "scaled_jacobian" in summary:
+        return f"{summary['scaled_jacobian']['smallest']:.3f}"
+    return f"{summary['min_angle']:.3f}°"
+
+
 def why(result: Mapping[str, Any]) -> str:
     """Return why a file has failed, without its name."""
     return str(result["error"]).removeprefix(f"{result['file']}: ")

@@ -29,7 +29,7 @@ from meshfix_cli.report.facts import (
 )
 from meshfix_cli.report.plain import plain
 from meshfix_cli.report.sliding import sliding
-from meshfix_cli.report.tally import STATUSES, Tally, before_and_after
+from meshfix_cli.report.tally import STATUSES, Tally, before_and_after, smallest
 
 if TYPE_CHECKING:
     from meshfix_cli.report.live import Line
@@ -202,10 +202,8 @@ def _result_line(result: Mapping[str, Any]) -> str:
 
 
 def _better(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    if "scaled_jacobian" in after:
-        old, new = (one["scaled_jacobian"]["smallest"] for one in (before, after))
-        return f"smallest scaled Jacobian {old:.3f} -> {new:.3f}"
-    return f"smallest angle {before['min_angle']:.3f}° -> {after['min_angle']:.3f}°"
+    name = "scaled Jacobian" if "scaled_jacobian" in after else "angle"
+    return f"smallest {name} {smallest(before)} -> {smallest(after)}"
 
 
 def _rows(report: Report) -> list[tuple[str, list[str]]]:

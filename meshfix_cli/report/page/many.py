@@ -9,7 +9,7 @@ from typing import Any
 
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.report.page.parts import hash_of, made, shown, table
-from meshfix_cli.report.tally import STATUSES, Tally, why
+from meshfix_cli.report.tally import STATUSES, Tally, smallest, why
 
 WORST_FIRST = ("invalid", "valid", "skipped")
 COLUMNS = ("file", "outcome", "elements", "inverted", "still", "smallest angle or scaled Jacobian", "after", "seconds")
@@ -67,14 +67,8 @@ def _each(files: Sequence[Kept]) -> Iterator[str]:
 def _row(one: Kept) -> list[str]:
     stages = one["before"], one["after"]
     inverted = [f"{stage['inverted']:,}" if stage else "" for stage in stages]
-    worst = [_smallest(stage) if stage else "" for stage in stages]
+    worst = [smallest(stage) if stage else "" for stage in stages]
     return [STATUSES[one["status"]], f"{one['elements']:,}", *inverted, *worst, f"{one['seconds']:.3g}"]
-
-
-def _smallest(stage: Mapping[str, Any]) -> str:
-    if "scaled_jacobian" in stage:
-        return f"{stage['scaled_jacobian']['smallest']:.3f}"
-    return f"{stage['min_angle']:.3f}°"
 
 
 def _not_met(one: Kept) -> list[str]:

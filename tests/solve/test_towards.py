@@ -146,7 +146,7 @@ def test_only_a_valid_mesh_of_the_same_elements_is_a_reference(plate: Mesh, brac
     ):
         with pytest.raises(InvalidMeshError, match=rf"^{said}$"):
             untangle(tangle(plate), reference=reference)
-    with pytest.raises(ValueError, match="with a reference all elements"):
+    with pytest.raises(ValueError, match="reference and only_invalid exclude each other"):
         untangle(tangle(plate), reference=plate, only_invalid=True)
 
 

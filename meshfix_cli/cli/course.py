@@ -22,6 +22,14 @@ _ENDED = {
     WRITING: "while writing; OUTPUT is what it was, or all of the new mesh",
     JUDGING: "once OUTPUT was written, before the report",
 }
+_INTO_A_STREAM = "while writing; OUTPUT may have the beginning of the new mesh"
+_NOT_WRITTEN = {WRITING: "once solved; nothing was written", JUDGING: "once solved, before the report"}
+# What follows a first signal where the best mesh is to be kept.
+_FOLLOWS = {
+    SOLVING: "the best mesh so far is kept once this sweep is done",
+    WRITING: "OUTPUT is completed",
+    JUDGING: "the report is completed",
+}
 
 
 class Course:
@@ -32,7 +40,9 @@ class Course:
     keep_best : bool
         A first signal lets it end with the best mesh so far.
     dry_run : bool
-        Nothing is written.
+        The mesh is not written.
+    streamed : bool
+        It goes to a stream, which has what was written of it when that ends.
 
     Attributes
     ----------
@@ -44,9 +54,11 @@ class Course:
         A signal has come, and the run is to end with the best mesh.
     """
 
-    def __init__(self, keep_best: bool, dry_run: bool) -> None:
+    def __init__(self, keep_best: bool, dry_run: bool, streamed: bool = False) -> None:
         self.doing, self.elements = READING, 0
-        self._keep_best, self._dry_run = keep_best, dry_run
+        self._keep_best = keep_best
+        self._ended = {**_ENDED, **({WRITING: _INTO_A_STREAM} if streamed else {}), **(_NOT_WRITTEN if dry_run else {})}
+        self._follows = {**_FOLLOWS, **({WRITING: _FOLLOWS[JUDGING]} if dry_run else {})}
         self._last: SweepRecord | None = None
         self.asked = False
         self._stopped: SweepRecord | None = None
@@ -61,18 +73,13 @@ class Course:
         if not self._keep_best or self.asked or self.doing == READING:  # there is nothing better than the input
             return ""
         self.asked = True
-        kept = "the best mesh so far is kept once this sweep is done"
-        if self.doing != SOLVING:
-            writes = self.doing == WRITING and not self._dry_run
-            kept = f"{'OUTPUT' if writes else 'the report'} is completed"
-        return f"{kept}; a second signal ends it without that"
+        return f"{self._follows[self.doing]}; a second signal ends it without that"
 
     def ended(self) -> str:
         """Say how far it was when it was ended."""
         if self.doing == SOLVING and self._last is not None:
             return f"interrupted {self._where(self._last)}; nothing was written"
-        nothing = self._dry_run and self.doing in (WRITING, JUDGING)
-        return f"interrupted {'once solved; nothing was written' if nothing else _ENDED[self.doing]}"
+        return f"interrupted {self._ended[self.doing]}"
 
     def _where(self, record: SweepRecord) -> str:
         left = f"{record.inverted:,} of {counted(self.elements, 'element', 'elements')} inverted"

@@ -69,7 +69,7 @@ def show_stage(shown: Shown, doing: str, files: Files) -> None:
     """Show what is done, where that takes a while; what goes to a stream may go to the terminal."""
     if doing == READING and is_large(files.source):
         shown.show(f"reading {files.source}")
-    elif doing == WRITING and (files.dry_run or _is_streamed(files.target)):
+    elif doing == WRITING and (files.dry_run or is_streamed(files.target)):
         shown.hide()
     elif doing == WRITING:
         shown.show(f"writing {files.target}")
@@ -79,10 +79,11 @@ def show_stage(shown: Shown, doing: str, files: Files) -> None:
 
 def report_stream(files: Files) -> Any:
     """Return stdout, or stderr where the mesh goes to stdout, or to a pipe or device that stdout may be."""
-    return sys.stderr if _is_streamed(files.target) and not files.dry_run else sys.stdout
+    return sys.stderr if is_streamed(files.target) and not files.dry_run else sys.stdout
 
 
-def _is_streamed(target: str) -> bool:
+def is_streamed(target: str) -> bool:
+    """Whether the mesh goes to stdout, a pipe or a device."""
     from meshfix_cli.meshfile.atomic import is_stream
 
     return is_stream(target) and not Path(target).is_dir()  # which a case of OpenFOAM is

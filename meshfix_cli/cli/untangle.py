@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.course import READING, SOLVING, Course
-from meshfix_cli.cli.files import given, open_files, report_stream, show_stage, write_cells
+from meshfix_cli.cli.files import given, is_streamed, open_files, report_stream, show_stage, write_cells
 from meshfix_cli.cli.help import METHOD, PROCESS, REPORT, Command, under
 from meshfix_cli.cli.names import FILE, HISTORY
 from meshfix_cli.cli.options import (
@@ -126,7 +126,7 @@ def untangle(
     if mpi and keep_best:
         raise click.UsageError("--mpi and --keep-best exclude each other")
     shown = show.live(wanted=True, every_sweep=verbose)
-    course = Course(keep_best, files.dry_run)
+    course = Course(keep_best, files.dry_run, is_streamed(files.target))
 
     def watch(steps: Steps) -> Steps:
         return shown.follow(course.follow(steps))

@@ -17,7 +17,7 @@ from commands import MESHFIX, POSIX, SLOW_DISK, TANGLED, error_line, run, start
 from places import SAMPLES
 
 from meshfix_cli import Mesh, read
-from meshfix_cli.cli.course import JUDGING, SOLVING, WRITING, Course
+from meshfix_cli.cli.course import JUDGING, READING, SOLVING, WRITING, Course
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.records import SweepRecord
 
@@ -94,6 +94,50 @@ def test_interrupted_while_writing(tmp_path: Path) -> None:
     assert said == ["meshfix: interrupted while writing; OUTPUT is what it was, or all of the new mesh"]
     assert (child.returncode, (tmp_path / "out.vtk").read_text()) == (130, "precious")
     assert [path.name for path in tmp_path.iterdir()] == ["out.vtk"]
+
+
+@POSIX
+def test_interrupted_while_writing_to_a_pipe(tmp_path: Path) -> None:
+    """Whoever reads it has a part of the mesh, and is told that it may be no more."""
+    fcntl = pytest.importorskip("fcntl")
+    if not hasattr(fcntl, "F_SETPIPE_SZ"):
+        pytest.skip("pipes that hold little")
+    fifo = tmp_path / "out.vtk"
+    os.mkfifo(fifo)
+    command = [MESHFIX, "untangle", "-q", TANGLED, str(fifo)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as child, fifo.open("rb", buffering=0) as reader:
+        fcntl.fcntl(reader, fcntl.F_SETPIPE_SZ, 4096)
+        assert reader.read(1) == b"#"
+        child.send_signal(signal.SIGINT)
+        said = told(child)
+    assert said == ["meshfix: interrupted while writing; OUTPUT may have the beginning of the new mesh"]
+    assert child.returncode == 130
+
+
+NONE = "nothing was written"
+
+
+@pytest.mark.parametrize(
+    ("doing", "options", "ended", "follows"),
+    [
+        (READING, {}, f"while reading; {NONE}", ""),
+        (READING, {"streamed": True, "dry_run": True}, f"while reading; {NONE}", ""),
+        (SOLVING, {"streamed": True}, f"before the first sweep; {NONE}", "the best mesh so far is kept once this"),
+        (WRITING, {}, "while writing; OUTPUT is what it was, or all of the new mesh", "OUTPUT is completed"),
+        (WRITING, {"streamed": True}, "while writing; OUTPUT may have the beginning", "OUTPUT is completed"),
+        (WRITING, {"streamed": True, "dry_run": True}, f"once solved; {NONE}", "the report is completed"),
+        (JUDGING, {}, "once OUTPUT was written, before the report", "the report is completed"),
+        (JUDGING, {"streamed": True}, "once OUTPUT was written, before the report", "the report is completed"),
+        (JUDGING, {"dry_run": True}, "once solved, before the report", "the report is completed"),  # a --history may be
+    ],
+)
+def test_what_is_told_of_files_is_so(doing: str, options: dict[str, bool], ended: str, follows: str) -> None:
+    course = Course(keep_best=True, **{"dry_run": False, **options})
+    course.begin(doing)
+    assert course.ended().startswith(f"interrupted {ended}")
+    first = course.hears()
+    assert first.startswith(follows) and bool(first) == bool(follows)
+    assert course.hears() == ""
 
 
 @POSIX

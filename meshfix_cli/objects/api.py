@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli.errors import InvalidMeshError, OptionError, WriteError, naming
-from meshfix_cli.mesh.mesh import Mesh, mask_of, regular
+from meshfix_cli.mesh.elements import counted, words
+from meshfix_cli.mesh.mesh import Mesh, mask_of
 from meshfix_cli.meshfile.displaced import displaced, places_in
 from meshfix_cli.meshfile.document import Document, build
 from meshfix_cli.meshfile.reading import read
 from meshfix_cli.meshfile.recognise import Format
-from meshfix_cli.objects.kinds import Kind, kind_of
+from meshfix_cli.objects.kinds import Kind, kind_of, points_of
 from meshfix_cli.objects.options import (
     OF_DOCUMENTS,
     Length,
@@ -132,7 +133,8 @@ class Result(Generic[M]):
         before, after = next(iter(self.report.stages.values())), self.summary
         worst = "smallest angle" if after.jacobians is None else "smallest scaled Jacobian"
         told = f"{after.inverted:,} of {after.elements:,} elements inverted ({before.inverted:,} before)"
-        return f"<{type(self).__name__} {self.report.name}: {told}, {worst} {after.smallest:.3g}>"
+        others = "".join(f", {counted(count, *words(key))} not judged" for key, count in self.report.not_judged.items())
+        return f"<{type(self).__name__} {self.report.name}: {told}{others}, {worst} {after.smallest:.3g}>"
 
     def plot(self, **options: Any) -> Any:
         """Return a `pyvista.Plotter` with the mesh before and after, coloured by quality, what is inverted in red.
@@ -367,12 +369,13 @@ class Repairer:
         Raises
         ------
         InvalidMeshError
-            They are no array of numbers, of another shape, or not finite.
+            They are no numbers, of another shape, or not finite.
         """
-        document = self._at(regular(points, "the points are"))
+        document = self._at(points_of(points))
         freed = self._method.freed(document, self._places)
         reach = self._method.reach(document.mesh, self._threads)
-        self.outcome = self._method.solve(freed.mesh, reach, self._threads, reference=self._places)
+        outcome = self._method.solve(freed.mesh, reach, self._threads, reference=self._places)
+        self.outcome = replace(outcome, all_judged=not document.not_judged)
         return freed.file_points(freed.first_valid_as_stored(self.outcome.after, self.outcome.before)[0])
 
     def _at(self, points: NDArray[Any]) -> Document:

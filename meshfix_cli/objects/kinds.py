@@ -92,12 +92,23 @@ def _moved_mesh(mesh: Mesh, points: NDArray[np.floating[Any]]) -> Mesh:
     return mesh.with_points(points.astype(np.float64))
 
 
-def _of_arrays(mesh: Any) -> Source:
-    points, cells = regular(mesh[0], "the points are"), mesh[1]
+def points_of(given: Any) -> NDArray[np.floating[Any]]:
+    """Return points (n, d) that a user gives.
+
+    Raises
+    ------
+    InvalidMeshError
+        They are none.
+    """
+    points = regular(given, "the points are")
     if points.ndim != 2 or points.dtype.kind not in "fiu":
         raise InvalidMeshError(f"the points are an array of shape {points.shape}, and not of (n, 2) or (n, 3) numbers")
-    points = points if points.dtype.kind == "f" else points.astype("f8")
-    return Source(points, [*_runs_of(points, cells)])
+    return points if points.dtype.kind == "f" else points.astype("f8")
+
+
+def _of_arrays(mesh: Any) -> Source:
+    points = points_of(mesh[0])
+    return Source(points, [*_runs_of(points, mesh[1])])
 
 
 def _runs_of(points: NDArray[np.floating[Any]], cells: Any) -> Iterable[Cells]:

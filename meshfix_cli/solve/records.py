@@ -69,7 +69,8 @@ class RankRecord:
 class Outcome:
     """A mesh before, after untangling and after smoothing, the record of every sweep, and what cannot be mended.
 
-    `ranks` are the processes, where there were several.
+    `ranks` are the processes, where there were several; `all_judged` tells whether there was nothing beside the mesh
+    that ought to be in it, and is held and not judged.
     """
 
     before: Mesh
@@ -78,8 +79,10 @@ class Outcome:
     records: tuple[SweepRecord, ...]
     obstacles: Obstacles
     ranks: tuple[RankRecord, ...] = ()
+    all_judged: bool = True
 
     @property
     def valid(self) -> bool:
-        """No element of the result is inverted, by its shape or by its numbering, and no boundary crosses itself."""
-        return self.records[-1].inverted == 0 and not (self.obstacles or self.after.topology.misnumbered.any())
+        """All is judged, no element is inverted, by its shape or its numbering, and no boundary crosses itself."""
+        inverted = self.records[-1].inverted or self.after.topology.misnumbered.any()
+        return self.all_judged and not (inverted or self.obstacles)

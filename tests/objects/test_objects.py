@@ -17,7 +17,7 @@ from meshes import tangle
 from places import SAMPLES
 
 import meshfix_cli
-from meshfix_cli import Mesh, MeshfixError, OptionError, Repairer, perturb, quality, read, untangle
+from meshfix_cli import InvalidMeshError, Mesh, MeshfixError, OptionError, Repairer, perturb, quality, read, untangle
 from meshfix_cli.objects import kinds
 
 pyvista = pytest.importorskip("pyvista")
@@ -354,6 +354,32 @@ def test_a_repairer_gives_elements_their_shapes_back() -> None:
     points, expected = repair(moved), untangle(meshio.Mesh(moved, mesh.cells), reference=mesh)
     assert repair.outcome is not None and repair.outcome.records[0].inverted > 0 and repair.outcome.valid
     np.testing.assert_allclose(points, expected.points, atol=1e-6)
+
+
+def test_what_is_not_judged_is_never_called_valid() -> None:
+    """Also by a repairer, whose outcome is that of the elements that are judged."""
+    cells = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7], [4, 4, 7, 7]])
+    points = np.array([(x, y) for y in range(3) for x in range(3)], dtype=np.float64)
+    result, repair = untangle((points, {"quad": cells})), Repairer((points, {"quad": cells}))
+    repair(points)
+    assert repair.outcome is not None
+    assert (result.valid, repair.outcome.valid) == (False, False)
+    told = "0 of 4 elements inverted (0 before), 1 collapsed quadrilateral not judged, smallest scaled Jacobian 1"
+    assert repr(result) == f"<Result (points, cells): {told}>"
+    repair = Repairer((points, {"quad": cells[:4]}))
+    repair(points)
+    assert repair.outcome is not None and repair.outcome.valid
+
+
+@pytest.mark.parametrize(
+    "given", [None, "x", np.full((9, 2), "x"), np.zeros((9, 2), complex), [[1.0, 2.0], [1.0]], np.zeros((9, 3)), 1.0]
+)
+def test_a_repairer_takes_points_only(given: Any) -> None:
+    points = np.array([(x, y) for y in range(3) for x in range(3)], dtype=np.float64)
+    repair = Repairer((points, {"quad": np.array([[0, 1, 4, 3], [1, 2, 5, 4]])}))
+    with pytest.raises(InvalidMeshError, match=r"^the points are [^\n]*$"):
+        repair(given)
+    np.testing.assert_array_equal(repair(points.tolist()), points)
 
 
 def test_what_a_notebook_shows() -> None:

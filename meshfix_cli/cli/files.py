@@ -46,7 +46,8 @@ def open_files(files: Files, held: Held, threads: int, *others: str | None) -> t
     if files.backup:
         _check_backups(beside, written)
     binary = output.binary or document.source.packed is not None
-    if binary and files.target == "-" and sys.stdout.isatty() and not files.dry_run:
+    on_stdout = files.target == "-" or _is_stdout(files.target)
+    if binary and on_stdout and sys.stdout.isatty() and not files.dry_run:
         raise click.UsageError("binary data is not written to a terminal; name an OUTPUT")
     return document, output
 

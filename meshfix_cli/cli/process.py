@@ -86,8 +86,10 @@ class Group(WithExamples, click.Group):
             if isinstance(getattr(stream, "buffer", None), io.RawIOBase):
                 setattr(sys, name, _buffered(stream))
                 setattr(sys, f"__{name}__", getattr(sys, name))
-        if "_MESHFIX_COMPLETE" in os.environ:
-            import_module("meshfix_cli.cli.completion")
+        if os.environ.get("_MESHFIX_COMPLETE"):
+            problem = import_module("meshfix_cli.cli.completion").problem()
+            if problem:
+                fail(problem)
         try:
             try:
                 return super().main(*args, **kwargs)

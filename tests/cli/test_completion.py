@@ -8,11 +8,11 @@ from pathlib import Path
 
 import click
 import pytest
-from commands import VALID
+from commands import VALID, error_line
 from places import ROOT
 from shells import SETUP, Shell, shell
 
-from meshfix_cli.cli import main
+from meshfix_cli.cli import completion, main
 from meshfix_cli.cli.names import Name
 from meshfix_cli.solve.strategies import STRATEGIES
 
@@ -34,6 +34,20 @@ COMPLETED = (
     ("meshfix untangle --report=report.html tang", "tangled.vtk"),
     ("meshfix untangle --report=rep", "--report=report.html"),
     ("meshfix untangle -o tang", "tangled.vtk"),
+    ("meshfix untangle --fix a=b tang", "tangled.vtk"),
+    ("meshfix untangle --fix zone:1 --slide=cu", "--slide=curved"),
+    ("meshfix untangle --require min_angle==5 tang", "tangled.vtk"),
+    ("meshfix untangle a=b.vtk --slide cu", "curved"),
+)
+# What bash says of a line: the words before the one that is completed, that, and what click is to take them for.
+IN_BASH: tuple[tuple[str, str, list[str]], ...] = (
+    ("untangle --fix = ", "", ["untangle", "--fix"]),
+    ("untangle --fix =", "=", ["untangle", "--fix"]),
+    ("untangle --fix = a :", "b", ["untangle", "--fix"]),
+    ("untangle --fix = a", ":", ["untangle", "--fix"]),
+    ("untangle a = b --require min_angle == 5", "x", ["untangle", "a=b", "--require", "min_angle==5"]),
+    ("untangle q =", "r", ["untangle"]),
+    ("", "=", []),
 )
 
 
@@ -87,3 +101,26 @@ def test_what_takes_a_file_is_known_to_shells() -> None:
             called = str(parameter.metavar or "").strip("[].")
             if called.startswith(("FILE", "DIR", "INPUT", "OUTPUT")) or called == "IN":
                 assert isinstance(parameter.type, Name), parameter.name
+
+
+@pytest.mark.parametrize(("before", "incomplete", "words"), IN_BASH)
+def test_bash_parts_words_at_signs(
+    before: str, incomplete: str, words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given = ["meshfix", *before.split(), *incomplete.split()]
+    monkeypatch.setenv("COMP_WORDS", "\n".join(given))
+    monkeypatch.setenv("COMP_CWORD", str(1 + len(before.split())))
+    left = "" if incomplete in ("=", ":") else incomplete
+    assert completion.Bash(main, {}, "meshfix", completion.VARIABLE).get_completion_args() == (words, left)
+
+
+@pytest.mark.parametrize(
+    "asked", ["bash", "bash_sourc", "csh_source", "bash_complete", "zsh_complete", "fish_complete"]
+)
+def test_what_no_shell_asks_for_is_one_sentence(asked: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("_MESHFIX_COMPLETE", asked)
+    assert error_line().startswith(f"meshfix: error: _MESHFIX_COMPLETE is '{asked}', which ")
+    monkeypatch.setenv("_MESHFIX_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", "meshfix unt")
+    monkeypatch.setenv("COMP_CWORD", "x")
+    assert error_line().startswith("meshfix: error: _MESHFIX_COMPLETE is 'bash_complete', which only the shell may")

@@ -194,6 +194,9 @@ _HEXAHEDRON = Shape(
 )  # fmt: skip
 
 
+COLLAPSED = "collapsed_"  # begins the keys of these
+
+
 def _collapsed(shape: Shape) -> Shape:
     """Of elements that name a node several times, and so have fewer corners, and are of no other type."""
     return Shape(f"collapsed {shape.name}", f"collapsed {shape.plural}", shape.dimension, 0)
@@ -242,7 +245,7 @@ _TABLE = (
     Element("pixel", _PIXEL, 4, vtk=8),
     Element("voxel", _VOXEL, 8, vtk=11),
     Element("polyhedron", _POLYHEDRON, 0, vtk=42),
-    *(Element(f"collapsed_{one.name}", _collapsed(one), 0) for one in _SHAPES),
+    *(Element(f"{COLLAPSED}{one.name}", _collapsed(one), 0) for one in _SHAPES),
 )
 ELEMENTS = {element.key: element for element in _TABLE}
 

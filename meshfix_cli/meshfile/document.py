@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
-from meshfix_cli.mesh.elements import counted, dimension_of
+from meshfix_cli.mesh.elements import COLLAPSED, counted, dimension_of, words
 from meshfix_cli.mesh.mesh import BETWEEN, LARGEST_COORDINATE, ON_BOUNDARY, Mesh, mask_of
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.meshfile.coincident import first_of_each_place
 from meshfix_cli.meshfile.notes import concave, notes_on
 from meshfix_cli.meshfile.plane import plane_basis
 from meshfix_cli.meshfile.recognise import Format
-from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, turned
+from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, solved_runs, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
 from meshfix_cli.meshfile.splice import Turned
 
@@ -332,14 +332,29 @@ def with_reversed(source: Source, cells: Mapping[int, Turned]) -> Source:
 
 
 def _solved(source: Source) -> Solved:
-    """Return what is solved for: no cell may be of a higher dimension."""
+    """Return what is solved for: no cell may be of a higher dimension.
+
+    Collapsed elements name points that are there, as those that are judged do.
+    """
     solved = solved_of(source.cells)
     if solved.parts:
+        if any(run.type.startswith(COLLAPSED) for run in solved.rest):
+            _check_named(source)
         return solved
     types = {run.type for run in solved.rest if len(run.vertices)}
     solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
     raise ReadError(f"there are no linear solid elements and no plane mesh of linear elements in it (cells: {found})")
+
+
+def _check_named(source: Source) -> None:
+    n = len(source.points)
+    for i in solved_runs(source.cells):
+        run = source.cells[i]
+        astray = np.flatnonzero(((run.vertices < 0) | (run.vertices >= n)).any(axis=1))
+        if len(astray):
+            vertices = run.vertices[astray[0]].tolist()
+            raise ReadError(f"a {words(run.type)[0]} refers to vertices {vertices}, but there are {n} points")
 
 
 def _ids(source: Source) -> list[NDArray[np.int64]]:

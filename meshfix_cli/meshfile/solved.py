@@ -20,7 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.elements import ELEMENTS, JUDGED, SIMPLICES, Element, dimension_of, element_of, straight_key
+from meshfix_cli.mesh.elements import (
+    COLLAPSED,
+    ELEMENTS,
+    JUDGED,
+    SIMPLICES,
+    Element,
+    dimension_of,
+    element_of,
+    straight_key,
+)
 from meshfix_cli.meshfile.source import Cells
 from meshfix_cli.meshfile.splice import Turned
 
@@ -315,7 +324,7 @@ def _without_repetitions(key: str, first: tuple[int, ...]) -> tuple[str, list[in
             for order in permutations(nodes):
                 if {_turned(tuple(order[node] for node in facet)) for facet in element.shape.facets} == facets:
                     return element.key, list(order)
-    return f"collapsed_{shape.name}", nodes
+    return f"{COLLAPSED}{shape.name}", nodes
 
 
 def _remaining(facets: Sequence[Facet], dimension: int) -> set[Facet]:

@@ -256,17 +256,29 @@ class Source:
         orders = [self._order(runs, [ids[i] for i in runs]) for runs in self._alike()]
         if all((order[1:] > order[:-1]).all() for order in orders):
             return self
-        whole = self.merged()
-        mine = whole.arrays
-        pairs = list(enumerate(orders))
-        cells = [_in(order, whole.cells[i]) for i, order in pairs]
+        return self.merged()._rows(orders)
+
+    def there(self) -> Source:
+        """Return the same without the cells that name points that are not there; itself if there are none."""
+        n, tables = len(self.points), [run.vertices for run in self.cells]
+        named = [((rows >= 0) & (rows < n)).all(axis=1) if isinstance(rows, np.ndarray) else None for rows in tables]
+        if all(mask is None or mask.all() for mask in named):
+            return self
+        sizes = map(len, tables)
+        orders = [np.arange(m) if mask is None else np.flatnonzero(mask) for mask, m in zip(named, sizes, strict=True)]
+        return self._rows(orders)
+
+    def _rows(self, orders: Sequence[NDArray[np.int64]]) -> Source:
+        """Return the same with some cells of each run, in some order."""
+        mine, pairs = self.arrays, list(enumerate(orders))
+        cells = [_in(order, self.cells[i]) for i, order in pairs]
         cell = {name: [values[i][order] for i, order in pairs] for name, values in mine.cell.items()}
         sets = {
             name: [np.flatnonzero(np.isin(order, rows[i])) for i, order in pairs]
             for name, rows in mine.cell_sets.items()
         }
         arrays = replace(mine, cell=cell, cell_sets=sets)
-        return replace(whole, cells=cells, load=lambda: arrays)
+        return replace(self, cells=cells, load=lambda: arrays)
 
     def _alike(self) -> list[list[int]]:
         """Return which runs have cells of one type and as many vertices."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import MeshfixError, WriteError
-from meshfix_cli.mesh.elements import dimension_of, words
+from meshfix_cli.mesh.elements import counted, dimension_of, words
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile import anew, compressed, foreign, formats
 from meshfix_cli.meshfile.atomic import check_target, is_stream, write_file, write_files
@@ -276,11 +276,17 @@ def _write_anew(
 ) -> tuple[NDArray[np.float64], tuple[str, ...]]:
     """Write and read again; return the points (n, d) as the file holds them, and what was dropped.
 
+    Cells that name points that are not there are left out: other programs would refuse the file, or read beyond it.
+
     Raises
     ------
     WriteError
         The format cannot hold the elements that are solved for, or rounds them too much.
     """
+    count = sum(len(run.vertices) for run in source.cells)
+    source = source.there()
+    count -= sum(len(run.vertices) for run in source.cells)
+    astray = (f"{counted(count, 'cell', 'cells')} that named points that are not there",) if count else ()
     if form.name in anew.WRITERS:
         prepared = anew.prepared(source, form)
         path.write_bytes(anew.written(prepared, points, form))
@@ -303,7 +309,7 @@ def _write_anew(
             raise WriteError(f"cannot be written as {form.name}: that holds no {words(lacking.type)[1]}{where}")
         corners = _spatial(back.points)[np.concatenate([rows.ravel() for rows in found])]
         difference = np.abs(corners - _spatial(held)[expected]).max()
-        dropped = lost(source, back)
+        dropped = (*astray, *lost(source, back))
         if back.arrays.unread:
             raise WriteError(f"cannot be written as {form.name}: it would hold {back.arrays.unread[0]}")
     except WriteError:

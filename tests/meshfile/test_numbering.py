@@ -10,6 +10,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from commands import error_line
 from laden import box, document_of, elements_of, laden, nodes_of, places, with_numbers, written
 from named_groups import named
 from programs import gmsh_session
@@ -163,3 +164,30 @@ def test_files_of_other_programs_have_numbers(reader: str, tmp_path: Path) -> No
     assert found is not None
     counts = np.array_equal(numbers, numbers[0] + np.arange(len(numbers)))
     assert np.array_equal(found, numbers) or "numbers of nodes" in dropped or (counts and numbers[0] == 0)
+
+
+@pytest.mark.parametrize("stray", [-1, 7, 2**31])
+@pytest.mark.parametrize(
+    "form", [*NUMBERED, Format("vtu"), Format("vtk"), Format("medit"), Format("su2"), Format("xdmf"), Format("med")]
+)
+def test_cells_that_name_points_that_are_not_there_are_left_out_and_told(
+    form: Format, stray: int, tmp_path: Path
+) -> None:
+    """Those that are held: other programs would refuse the file, or read beyond its points. Others of the type stay."""
+    source = box([1, 2, 3, 4, 5], [1, 2], [3, 4])
+    arrays = Arrays(cell={"a": [np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array([5.0, 6.0])]})
+    astray = Cells("triangle", np.array([[0, 1, stray], [1, 2, 3]]))
+    back, dropped = written(replace(source, cells=[*source.cells, astray], load=lambda: arrays), form, tmp_path / "out")
+    told, *others = dropped
+    assert told == "1 cell that named points that are not there"
+    assert set(others) <= {"cell data a"}
+    assert [len(back.vertices_of(key, corners)) for key, corners in (("tetra", 4), ("triangle", 3))] == [2, 3]
+
+
+@pytest.mark.parametrize("row", ["1 1 99", "1 0 0", "-3 -3 1", "99 99 99"])
+def test_a_collapsed_element_names_points_that_are_there(row: str, tmp_path: Path) -> None:
+    """As any other element does, or the file is damaged."""
+    head = "MeshVersionFormatted 2\nDimension 2\nVertices 4\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+    (tmp_path / "in.mesh").write_text(f"{head}Triangles 3\n1 2 3 0\n1 3 4 0\n{row} 0\nEnd\n")
+    said = error_line("untangle", tmp_path / "in.mesh", tmp_path / "out.inp")
+    assert re.search(r"in.mesh: a triangle refers to vertices \[.*\], but there are 4 points$", said)

@@ -201,7 +201,7 @@ def solved_of(cells: Sequence[Cells]) -> Solved:
             if part.key in ELEMENTS and ELEMENTS[part.key].judged_by:
                 parts.append(part)
             else:
-                rest.append(Cells(part.key, part.vertices))
+                rest.append(Cells(part.key, part.vertices if part.nodes is None else part.nodes))
     return Solved(tuple(parts), tuple(rest))
 
 

@@ -105,6 +105,13 @@ def test_what_is_nothing_is_held() -> None:
     assert (triangles.blocks.tolist(), triangles.not_judged()) == ([[0, 1, 2]], {"collapsed_triangle": 1})
 
 
+def test_a_collapsed_element_holds_its_other_nodes_too() -> None:
+    rows = np.array([[0, 1, 2, 3, 4, 5], [0, 0, 1, 7, 4, 7], [6, 6, 6, 8, 8, 8]])
+    solved = solved_of([Cells("triangle6", rows)])
+    assert (solved.m, solved.not_judged()) == (1, {"collapsed_triangle": 2})
+    assert sorted(row for run in solved.rest for row in run.vertices.tolist()) == rows[1:].tolist()
+
+
 def test_what_is_of_no_type_is_held() -> None:
     """A hexahedron that has lost one edge has seven corners."""
     rows = np.array([[0, 1, 2, 3, 4, 5, 6, 7], [0, 1, 2, 2, 4, 5, 6, 7], [0, 1, 2, 2, 4, 5, 6, 6]])

@@ -53,11 +53,14 @@ nb::tuple find_cards_py(const nb::bytes& data) {
 }
 
 nb::tuple card_fields_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t most, bool whole) {
-    constexpr std::size_t FEW = 256;  // bytes of the text to a card: then they are most of it
-    const bool most_of_it = offsets.shape(0) > view_of(data).size() / FEW;
-    const CardText deck = most_of_it ? CardText::searched(view_of(data)) : CardText(view_of(data));
-    CardFields cards;
-    for (std::size_t i = 0; i < offsets.shape(0); ++i) add_card(deck, offsets(i), most, whole, cards);
+    constexpr std::int64_t FEW = 256;  // bytes of the text to a card: then they are most of it
+    const CardText any(view_of(data));
+    const auto count = static_cast<std::int64_t>(offsets.shape(0));
+    const bool close = count > 1 && std::is_sorted(offsets.data(), offsets.data() + count) && offsets(0) >= 0 &&
+                       offsets(count - 1) < any.size() && (offsets(count - 1) - offsets(0)) / FEW < count;
+    const CardText deck = close ? CardText::between(any.text, offsets(0), offsets(count - 1)) : any;
+    CardFields cards(count);
+    for (std::int64_t i = 0; i < count; ++i) add_card(i + 1 < count ? deck : any, offsets(i), most, whole, cards);
     return nb::make_tuple(to_numpy(std::move(cards.spans), 2), to_numpy(std::move(cards.starts)), to_numpy(std::move(cards.widths)));
 }
 

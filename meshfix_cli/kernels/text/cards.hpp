@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <string_view>
 #include <unordered_map>
 #include <vector>
@@ -62,6 +63,14 @@ struct CardText {
         }
         CardText deck(data);
         deck.comments = comments, deck.commas = commas, deck.returns = returns, deck.tabs = tabs;
+        return deck;
+    }
+
+    // A text of which cards that lie between two others are read, as that is known of the lines there.
+    static CardText between(std::string_view data, std::int64_t first, std::int64_t last) {
+        const std::int64_t end = find_byte(data, '\n', last, static_cast<std::int64_t>(data.size()));
+        CardText deck = searched(data.substr(first, end - first));
+        deck.text = data;
         return deck;
     }
 };
@@ -239,7 +248,7 @@ inline Span scan_line(std::string_view text, const CardLine& line, std::int64_t&
     std::int64_t count = line.fields(), filled = 0;
     Span named;
     for (std::int64_t i = count; begins && i < Cards::HEAD; ++i) head[i] = OTHER_FIELD;
-    if (line.free || line.tabs || line.large) {
+    if (line.free || line.tabs) {
         named = line.each_field(text, [&](std::int64_t i, Span field) {
             count = std::max(count, i + 1);
             if (without_blanks(text, field).begin < field.end) filled = i + 1;
@@ -247,10 +256,11 @@ inline Span scan_line(std::string_view text, const CardLine& line, std::int64_t&
             return true;
         });
     } else {
-        const std::int64_t behind = std::min(line.end, line.data + 8 * count);
-        filled = (without_blanks(text, {line.data, behind}).end - line.data + 7) / 8;
-        for (std::int64_t i = 0, at = line.data; begins && i < std::min<std::int64_t>(filled, Cards::HEAD); ++i, at += 8) {
-            head[i] = at + 8 <= behind ? read_integer_columns(text, at) : read_integer_field(text, {at, behind});
+        const std::int64_t width = line.width(), behind = std::min(line.end, line.data + width * count);
+        filled = (without_blanks(text, {line.data, behind}).end - line.data + width - 1) / width;
+        for (std::int64_t i = 0, at = line.data; begins && i < std::min<std::int64_t>(filled, Cards::HEAD); ++i, at += width) {
+            const bool quick = width == 8 && at + width <= behind;
+            head[i] = quick ? read_integer_columns(text, at) : read_integer_field(text, {at, std::min(at + width, behind)});
             if (head[i] == OTHER_FIELD) std::fill(head + i, head + Cards::HEAD, OTHER_FIELD), i = filled;
         }
         named = behind < line.end ? without_blanks(text, {behind, std::min(line.end, behind + 8)}) : Span{behind, behind};
@@ -343,6 +353,11 @@ struct CardFields {
     std::vector<std::int64_t> starts{0};  // the number of the first field of each card, and of all
     std::vector<std::uint8_t> widths;     // the columns of each; 0: it is free
 
+    explicit CardFields(std::int64_t count) {  // what is not used of the room is never touched
+        spans.reserve(16 * count);
+        starts.reserve(count + 1);
+        widths.reserve(8 * count);
+    }
     void add(Span field, int width) {
         spans.insert(spans.end(), {field.begin, field.end});
         widths.push_back(static_cast<std::uint8_t>(width));
@@ -354,34 +369,31 @@ struct CardFields {
     }
 };
 
-// The line that continues a card, of which another begins at an offset; false: there is none.
-inline bool find_continuation(const CardText& deck, std::int64_t at, std::int64_t& found) {
+// The line that continues a card, of which another begins at an offset; nothing: there is none.
+inline std::optional<CardLine> continuation(const CardText& deck, std::int64_t at) {
     while (at < deck.size()) {
         const CardLine line(deck, at);
-        if (!line.blank) {
-            found = at;
-            return line.continues(deck.text);
-        }
+        if (!line.blank) return line.continues(deck.text) ? std::optional<CardLine>(line) : std::nullopt;
         at = line.next;
     }
-    return false;
+    return std::nullopt;
 }
 
 // Calls f(number, span, columns) for the first fields of a card, at most `most`; what a line does not reach, and another
 // continues, has no span.
 template <class F>
 void each_field_of(const CardText& deck, std::int64_t at, std::int64_t most, const F& f) {
+    if (most <= 0) return;
     std::int64_t count = 0;
-    for (bool more = most > 0; more;) {
-        const CardLine line(deck, at);
+    for (std::optional<CardLine> line(std::in_place, deck, at); line;) {
         const std::int64_t first = count;
-        line.each_field(deck.text, [&](std::int64_t, Span field) {
-            f(count++, field, line.width());
+        line->each_field(deck.text, [&](std::int64_t, Span field) {
+            f(count++, field, line->width());
             return count < most;
         });
-        more = count < most && find_continuation(deck, line.next, at);
-        while (more && count < std::min(most, first + line.fields())) f(count++, Span{}, line.width());
-        more = more && count < most;
+        const std::optional<CardLine> next = count < most ? continuation(deck, line->next) : std::nullopt;
+        while (next && count < std::min(most, first + line->fields())) f(count++, Span{}, line->width());
+        line = count < most ? next : std::nullopt;
     }
 }
 

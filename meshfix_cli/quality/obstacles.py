@@ -217,7 +217,8 @@ def _overlapping(
     facets, rows = np.ascontiguousarray(facets[shared == 0]), rows[shared == 0]
     corners, parts = points[facets], component[rows]
     size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    length = _crossing_lengths(points, facets, parts, size, movable, threads)
+    count = int(component.max()) + 1  # some have no facet of their own: of two elements, one the other's back
+    length = _crossing_lengths(points, facets, parts, count, size, movable, threads)
     below = np.where(length[parts] > 0, CONTACT * np.maximum(size, length[parts]), TOUCHING * size)
     places = corners.mean(axis=1) - below[:, None] * _outward(corners)
     largest = np.zeros(len(component))  # facet at the boundary, of each simplex
@@ -234,15 +235,16 @@ def _crossing_lengths(
     points: Array,
     facets: NDArray[np.int32],
     parts: NDArray[np.int32],
+    count: int,
     size: Array,
     movable: NDArray[np.bool_],
     threads: int,
 ) -> Array:
-    """Return the size of the largest of the fixed facets (f, d) with which each part (p,) crosses another, or 0."""
+    """Return the size of the largest of the fixed facets (f, d) with which each part (count,) crosses another, or 0."""
     fixed = np.flatnonzero(~movable[facets].any(axis=1))
     pairs = fixed[kernels.crossings(points, np.ascontiguousarray(facets[fixed]), threads)]
     pairs = pairs[parts[pairs[:, 0]] != parts[pairs[:, 1]]]
-    length = np.zeros(parts.max() + 1)
+    length = np.zeros(count)
     np.maximum.at(length, parts[pairs].ravel(), np.repeat(size[pairs].max(axis=1), 2))
     return length
 

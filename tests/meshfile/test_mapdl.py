@@ -169,6 +169,8 @@ def test_what_was_written_has_a_digit_before_the_point(tmp_path: Path) -> None:
         ("        4        0        4", "        9        0        4", "have not the lines that their numbers"),
         ("ELEM,       2", "ELEM,       9", "truncated"),
         ("(19i9)", "(9i9)", "has no 19 columns"),
+        ("(19i9)", "(0i9)", "the format of a block has no integers"),
+        ("ET,1,182", "ETBLOCK,1,1\n(1i9)\n        1\n       -1", "the types of elements have no numbers of their own"),
     ],
 )
 def test_what_is_wrong_is_named(before: str, after: str, words: str) -> None:

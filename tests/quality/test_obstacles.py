@@ -240,3 +240,11 @@ def test_nothing_waits_for_what_obstacles_name() -> None:
     assert not outcome.valid
     assert len([record for record in outcome.records if record.phase.startswith("FF")]) <= 30
     assert outcome.obstacles.hopeless(mesh) is not None
+
+
+def test_a_part_that_is_the_back_of_another_element_has_no_facet_of_its_own() -> None:
+    square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    points = np.concatenate([square, square + np.array([3, 0])])
+    mesh = Mesh.build(points, [("quad", [[0, 1, 2, 3], [4, 5, 6, 7], [5, 4, 7, 6]])], fixed=range(4, 8))
+    found = find_obstacles(mesh)
+    assert (found.inverted.tolist(), found.overlapping.tolist()) == ([2], [])

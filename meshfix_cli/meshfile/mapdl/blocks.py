@@ -152,6 +152,8 @@ class Archive:
         elif name.endswith("BLOCK"):
             block, at = self._block(words, at)
             if name == "ETBLOCK":
+                if len(block.form.widths) < 2:
+                    raise in_line(self.text, match.start(), "the types of elements have no numbers of their own")
                 for number, kind, *options in block.values(0, min(len(block.form.widths), 3)).tolist():
                     self._element[number], self._option[number] = kind, sum(options)
             else:
@@ -185,6 +187,8 @@ class Archive:
             raise in_line(self.text, at + 1, "a block has no format that is known, as (3i9,6e21.13e3)")
         widths = [(int(width),) * min(int(number or 1), 99) for number, width in _INTEGERS.findall(match[1])]
         form = Format(sum(widths, ()))
+        if not form.widths:
+            raise in_line(self.text, at + 1, "the format of a block has no integers")
         if match[3]:
             form = Format(form.widths, int(match[2] or 1), int(match[3]), int(match[4] or 2))
         return form, match.end()

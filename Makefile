@@ -71,7 +71,7 @@ wheels: ## make a wheel for each of PYTHONS that is here, audit it, and try it i
 	$(VENV)-wheels/bin/python packages/wheels.py out/wheels $(PYTHONS)
 
 CLANG ?= clang++
-clang: $(VENV)/installed ## build the kernels by clang as plain C++, and compare the bits of results with those of this build
+clang: $(VENV)/developer ## build the kernels by clang as plain C++, and compare the bits of results with those of this build
 	$(PYTHON) -m venv $(VENV)-clang
 	CXX=$(CLANG) $(VENV)-clang/bin/python -m pip install --quiet --disable-pip-version-check --no-compile . pytest \
 	  --config-settings=cmake.define.MESHFIX_PLAIN=ON --config-settings=cmake.define.MESHFIX_WERROR=ON

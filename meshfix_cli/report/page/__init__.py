@@ -7,8 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path, PurePath
-from string import Template
+from pathlib import PurePath
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,7 @@ from meshfix_cli.report.facts import (
 )
 from meshfix_cli.report.figures import Cells, Figures, Scene, Worst, number_of
 from meshfix_cli.report.page import charts
-from meshfix_cli.report.page.parts import hash_of, made, scrolled, shown, table
+from meshfix_cli.report.page.parts import filled, framed, made, read, scrolled, shown, table
 from meshfix_cli.report.sliding import sliding
 
 FARTHEST = 1e6  # sizes of the mesh: single precision holds it, and nobody looks there
@@ -51,21 +50,8 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
     options : mapping
         Those of the command line and their values.
     """
-    skeleton, style, script = (
-        (Path(__file__).parent / name).read_text(encoding="utf-8")
-        for name in ("skeleton.html", "style.css", "viewer.js")
-    )
-    return Template(skeleton).substitute(
-        style=style,
-        script=script,
-        style_hash=hash_of(style),
-        script_hash=hash_of(script),
-        heading=shown(PurePath(report.name).name or report.name),
-        command=shown(report.command),
-        subject=shown(title(report)),
-        outcome="valid" if report.valid else "wrong",
-        verdict=_verdict(report),
-        lead=_lead(report),
+    content = filled(
+        "one.html",
         picture=shown(_in_words(report, drawn.scene)),
         stages=_stages(drawn.scene),
         legend=_legend(report, drawn.scene),
@@ -76,9 +62,20 @@ def page(report: Report, drawn: Figures, options: Mapping[str, str]) -> str:
         and_convergence=" and convergence" if drawn.convergence else "",
         charts=_charts(report, drawn),
         worst=_worst(report, drawn),
+    )
+    data = {"report": to_json(replace(report, everything=False)), "scene": _scene(drawn.scene)}
+    elements = (f'<script type="application/json" id="{name}">{_json(one)}</script>\n' for name, one in data.items())
+    return framed(
+        report.valid,
+        script=read("viewer.js"),
+        data="".join(elements),
+        command=shown(report.command),
+        heading=shown(PurePath(report.name).name or report.name),
+        subject=f'\n<p class="subject">{shown(title(report))}</p>',
+        verdict=_verdict(report),
+        lead=f"\n{_lead(report)}",
+        content=content,
         made=_made(report, options),
-        report=_json(to_json(replace(report, everything=False))),
-        scene=_json(_scene(drawn.scene)),
     )
 
 

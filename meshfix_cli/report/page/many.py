@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
-from string import Template
 from typing import Any
 
 from meshfix_cli.mesh.elements import counted
-from meshfix_cli.report.page.parts import hash_of, made, shown, table
+from meshfix_cli.report.page.parts import filled, framed, made, shown, table
 from meshfix_cli.report.tally import STATUSES, Tally, smallest, why
 
 WORST_FIRST = ("invalid", "valid", "skipped")
@@ -31,20 +29,17 @@ def page_of_many(files: Sequence[Kept], total: int, tally: Tally, options: Mappi
     options : mapping
         Those of the command line and their values.
     """
-    skeleton, style = (
-        (Path(__file__).parent / name).read_text(encoding="utf-8") for name in ("many.html", "style.css")
-    )
     done = len(files) == total
     good = all(one["status"] in ("valid", "skipped") and not _not_met(one) for one in files)
     left = "" if done else f", of which {counted(total - len(files), 'was', 'were')} not begun or not done"
-    return Template(skeleton).substitute(
-        style=style,
-        style_hash=hash_of(style),
+    verdict = "All are valid" if good and done else "Stopped" if good else "Not all are valid"
+    every = table("Before and after", ["", "before", "after"], tally.rows())
+    return framed(
+        good and done,
+        command="batch",
         heading=shown(f"{counted(total, 'mesh', 'meshes')}{left}"),
-        outcome="valid" if good and done else "wrong",
-        verdict="All are valid" if good and done else "Stopped" if good else "Not all are valid",
-        all=table("Before and after", ["", "before", "after"], tally.rows()),
-        each="".join(_each(files)),
+        verdict=f"<p><strong>{verdict}</strong></p>",
+        content=filled("many.html", all=every, each="".join(_each(files))),
         made=made((name, [value]) for name, value in options.items()),
     )
 

@@ -8,10 +8,49 @@ from collections.abc import Iterable, Sequence
 from hashlib import sha256
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from string import Template
 
 from meshfix_cli.report.plain import plain
 
 PACKAGES = ("meshfix-cli", "numpy", "scipy", "meshio")
+
+
+def filled(name: str, **parts: str) -> str:
+    """Return what stands in a file of this folder, with its parts in their places."""
+    return Template(read(name)).substitute(parts)
+
+
+def read(name: str) -> str:
+    """Return a file of this folder."""
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+
+
+def framed(good: bool, script: str = "", data: str = "", **parts: str) -> str:
+    """Return a page.
+
+    Parameters
+    ----------
+    good : bool
+        The colour of the verdict.
+    script : str
+        What runs in it.
+    data : str
+        Elements that the script reads.
+    parts : str
+        HTML: `command`, `heading`, `verdict`, `content` and `made`; `subject` is below the heading, `lead` below the
+        verdict.
+    """
+    style = read("style.css")
+    return filled(
+        "frame.html",
+        style=style,
+        style_hash=hash_of(style),
+        script_policy=f" script-src '{hash_of(script)}';" if script else "",
+        outcome="valid" if good else "wrong",
+        scripts=f"{data}<script>{script}</script>\n" if script else "",
+        **{"subject": "", "lead": "", **parts},
+    )
 
 
 def shown(text: str) -> str:

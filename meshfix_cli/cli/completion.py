@@ -7,7 +7,8 @@ from collections.abc import Iterable
 
 from click.shell_completion import BashComplete, FishComplete, ZshComplete, add_completion_class, get_completion_class
 
-VARIABLE = "_MESHFIX_COMPLETE"
+from meshfix_cli.cli.process import COMPLETE
+
 _TASKS = ("source", "complete")
 _SIGNS = frozenset("=:")
 
@@ -50,14 +51,14 @@ class Fish(FishComplete):
 
 def problem() -> str:
     """Say what is wrong with what a shell asks for, in one sentence; nothing: it can be answered."""
-    shell, _, task = os.environ[VARIABLE].partition("_")
+    shell, _, task = os.environ[COMPLETE].partition("_")
     if get_completion_class(shell) is None or task not in _TASKS:
         known = ", ".join(f"{one}_{_TASKS[0]}" for one in ("bash", "zsh", "fish"))
-        return f"{VARIABLE} is {os.environ[VARIABLE]!r}, which asks for nothing that is known; there are {known}"
+        return f"{COMPLETE} is {os.environ[COMPLETE]!r}, which asks for nothing that is known; there are {known}"
     if task == "complete":
         number = os.environ.get("COMP_CWORD", "")
         if "COMP_WORDS" not in os.environ or not (shell == "fish" or number.isdecimal()):
-            return f"{VARIABLE} is {os.environ[VARIABLE]!r}, which only the shell may ask for, with COMP_WORDS"
+            return f"{COMPLETE} is {os.environ[COMPLETE]!r}, which only the shell may ask for, with COMP_WORDS"
     return ""
 
 

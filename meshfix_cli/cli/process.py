@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from meshfix_cli.repair import Method, Steps
     from meshfix_cli.workers.distributed import Root
 
+COMPLETE = "_MESHFIX_COMPLETE"  # by what shells ask for completion
 CLEAR = "\r\x1b[2K"  # what stands in the line of a terminal
 
 VALID, ERROR, INVERTED, SOME_FAILED = 0, 1, 3, 4  # 2, wrong usage, is click's
@@ -86,7 +87,7 @@ class Group(WithExamples, click.Group):
             if isinstance(getattr(stream, "buffer", None), io.RawIOBase):
                 setattr(sys, name, _buffered(stream))
                 setattr(sys, f"__{name}__", getattr(sys, name))
-        if os.environ.get("_MESHFIX_COMPLETE"):
+        if os.environ.get(COMPLETE):
             problem = import_module("meshfix_cli.cli.completion").problem()
             if problem:
                 fail(problem)

@@ -342,7 +342,7 @@ def _checked_simplices(
     rows = np.ascontiguousarray(small, dtype=np.int32)
     outside, repeated = kernels.check_simplices(rows, n, threads)
     if outside >= 0:
-        raise refers_outside(outside, simplices[outside], n)
+        raise refers_outside(f"element {outside}", simplices[outside], n)
     if repeated >= 0:
         raise names_twice(repeated, simplices[repeated])
     return rows

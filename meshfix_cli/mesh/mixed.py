@@ -167,7 +167,7 @@ def checked_blocks(cells: Sequence[tuple[str, ArrayLike]], n: int, dimension: in
         outside = ((rows < 0) | (rows >= n)).any(axis=1)
         if outside.any():
             first = int(np.argmax(outside))
-            raise refers_outside(before + first, rows[first], n)
+            raise refers_outside(f"element {before + first}", rows[first], n)
         ordered = np.sort(rows, axis=1)
         repeated = (ordered[:, 1:] == ordered[:, :-1]).any(axis=1)
         if repeated.any():

@@ -150,7 +150,7 @@ def ties_of(blocks: Blocks, n: int) -> tuple[Ties, Mask]:
         outside = ((rows < 0) | (rows >= n)).any(axis=1)
         if outside.any():
             row = int(np.argmax(outside))
-            raise refers_outside(start + row, rows[row], n)
+            raise refers_outside(f"element {start + row}", rows[row], n)
     known = _Known(n)
     for element, rows in blocks:
         for _, tie in _between(element, rows):

@@ -298,10 +298,10 @@ def read_only(array: NDArray[_T]) -> NDArray[_T]:
     return array
 
 
-def refers_outside(row: int, vertices: NDArray[np.integer], n: int) -> InvalidMeshError:
-    """Return the complaint about an element of vertices that are not among the n points."""
+def refers_outside(what: str, vertices: NDArray[np.integer], n: int) -> InvalidMeshError:
+    """Return the complaint about an element, by what it is called, of vertices that are not among the n points."""
     there = f"there {'is' if n == 1 else 'are'} {counted(n, 'point', 'points')}"
-    return InvalidMeshError(f"element {row} refers to vertices {vertices.tolist()}, but {there}")
+    return InvalidMeshError(f"{what} refers to vertices {vertices.tolist()}, but {there}")
 
 
 def names_twice(row: int, vertices: NDArray[np.integer]) -> InvalidMeshError:

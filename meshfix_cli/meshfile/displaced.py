@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from meshfix_cli.errors import ReadError, listed, naming
 from meshfix_cli.mesh.reference import reference_points
 from meshfix_cli.meshfile.document import Document
+from meshfix_cli.meshfile.plane import is_level
 
 OUT_OF_PLANE = 1e-6  # of a mean edge, by which points may leave the plane of a mesh
 
@@ -45,8 +46,7 @@ def _vectors(document: Document, name: str) -> NDArray[np.float64]:
         raise ReadError(f"there is no point data named {name!r} (vectors: {known})")
     vectors = np.asarray(arrays[name])
     columns = vectors.shape[1] if vectors.ndim == 2 else 1
-    level = document.basis is not None and bool((document.basis == np.eye(3)[:2]).all())
-    least = 2 if level else original.shape[1]
+    least = 2 if document.basis is not None and is_level(document.basis) else original.shape[1]
     if not least <= columns <= 3 or vectors.dtype.kind not in "fiu" or len(vectors) != len(original):
         needed = f"{'2 or ' * (least == 2)}3 numbers for each point"
         raise ReadError(f"the point data {name!r} are no vectors, {needed}: there are {columns}")

@@ -14,10 +14,10 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
 from meshfix_cli.mesh.elements import COLLAPSED, counted, dimension_of, words
 from meshfix_cli.mesh.mesh import BETWEEN, LARGEST_COORDINATE, ON_BOUNDARY, Mesh, mask_of
-from meshfix_cli.mesh.topology import Topology, distinct
+from meshfix_cli.mesh.topology import Topology, distinct, refers_outside
 from meshfix_cli.meshfile.coincident import first_of_each_place
 from meshfix_cli.meshfile.notes import concave, notes_on
-from meshfix_cli.meshfile.plane import plane_basis
+from meshfix_cli.meshfile.plane import is_level, plane_basis
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import Part, Solved, ids_of, solved_of, solved_runs, turned
 from meshfix_cli.meshfile.source import REGIONS, Cells, Source
@@ -298,7 +298,7 @@ def build(
     for mask in holds.values():
         mesh = mesh.with_fixed(mask)
     # A plane in space has no side from which the numbering could be judged, but for that of constant z.
-    seen_from_above = basis is None or bool((basis == np.eye(3)[:2]).all())
+    seen_from_above = basis is None or is_level(basis)
     notes = (*source.notes, *notes_on(mesh, solved, seen_from_above, copies, ties), *concave(mesh, form))
     notes += tuple(f"--fix {one} holds no vertex: there is none in it" for one, mask in named.items() if not mask.any())
     ids = solved.of_elements(_ids(source))
@@ -353,8 +353,7 @@ def _check_named(source: Source) -> None:
         run = source.cells[i]
         astray = np.flatnonzero(((run.vertices < 0) | (run.vertices >= n)).any(axis=1))
         if len(astray):
-            vertices = run.vertices[astray[0]].tolist()
-            raise ReadError(f"a {words(run.type)[0]} refers to vertices {vertices}, but there are {n} points")
+            raise refers_outside(f"a {words(run.type)[0]}", run.vertices[astray[0]], n)
 
 
 def _ids(source: Source) -> list[NDArray[np.int64]]:

@@ -48,6 +48,11 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     return np.stack([axes[:, 2], np.cross(normal_vector, axes[:, 2])])
 
 
+def is_level(basis: NDArray[np.float64]) -> bool:
+    """Whether a plane is one of constant z, seen from above."""
+    return bool((basis == np.eye(3)[:2]).all())
+
+
 def _drawn_near(points: NDArray[np.float64], epsilon: float) -> tuple[NDArray[np.float64], float]:
     """Return the points with what is far away brought near in its direction, and the relative rounding of these.
 

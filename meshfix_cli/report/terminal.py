@@ -111,20 +111,13 @@ def print_tally(tally: Tally, seconds: float, out: Console) -> None:
 
 def with_counts(results: Iterable[dict[str, Any]], total: int, out: Console) -> Iterator[dict[str, Any]]:
     """Pass results through and show on a terminal how many there are; the line is gone while one is looked at."""
-    if not out.is_terminal:
-        yield from results
-        return
-    from meshfix_cli.report.live import Line
-
-    files, line = counted(total, "file", "files"), Line(out)
-    try:
-        line.show(f"0 of {files}", 0.0)
+    files = counted(total, "file", "files")
+    with Shown(out) as shown:
+        shown.show(f"0 of {files}", 0.0)
         for done, result in enumerate(results, 1):
-            line.hide()
+            shown.hide()
             yield result
-            line.show(f"{done:,} of {files}", done / total)
-    finally:
-        line.hide()
+            shown.show(f"{done:,} of {files}", done / total)
 
 
 class Shown:

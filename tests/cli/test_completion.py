@@ -14,6 +14,7 @@ from shells import SETUP, Shell, shell
 
 from meshfix_cli.cli import completion, main
 from meshfix_cli.cli.names import Name
+from meshfix_cli.cli.process import COMPLETE
 from meshfix_cli.solve.strategies import STRATEGIES
 
 NAMES = ("tangled.vtk", "wing with tail.vtk", "report.html")
@@ -111,7 +112,7 @@ def test_bash_parts_words_at_signs(
     monkeypatch.setenv("COMP_WORDS", "\n".join(given))
     monkeypatch.setenv("COMP_CWORD", str(1 + len(before.split())))
     left = "" if incomplete in ("=", ":") else incomplete
-    assert completion.Bash(main, {}, "meshfix", completion.VARIABLE).get_completion_args() == (words, left)
+    assert completion.Bash(main, {}, "meshfix", COMPLETE).get_completion_args() == (words, left)
 
 
 @pytest.mark.parametrize(

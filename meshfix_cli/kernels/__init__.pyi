@@ -442,18 +442,18 @@ def read_lines(data: bytes, at: int, count: int) -> tuple[Int64, Int64, int]:
     A word that is none has a number whose bits are the highest and, from the lowest on, those of its first seven bytes.
     """
 
-def find_cards(data: bytes) -> tuple[Uint8, Int64, Int64, Int64, Int64]:
+def find_cards(data: bytes) -> tuple[Uint8, Int32, Int64, Int64, Int32, Int32]:
     """Cards of Nastran: the different names (k, 8) in capitals and, for each of n cards, what follows.
 
-    Which name it has (n,), its offset (n,), how many fields up to the last that is not blank (n,), or -1 where lines
-    that follow it continue another card, and the integers in its first six fields (n, 6): the smallest that there is
-    where a field is blank, the next one where it, or one before it, is something else or stands on another line.
+    Which name it has (n,), its offset (n,), its fields up to the last that is not blank (n,), or -1 where lines that
+    follow it continue another card, and the integers in its first two (n, 2) and the next four (n, 4): the smallest
+    where a field is blank, the next one where it, or one before it, is something else or larger, or on another line.
     """
 
 def card_integers(data: bytes, offsets: Int64, first: int, last: int, texts: bool) -> tuple[Int64, int]:
     """Integers (k, last - first) in fields of cards at offsets (k,), and where there is none, or -1.
 
-    Blank fields are the smallest integer that there is, and so are, if `texts`, those from a text on.
+    Blank fields are the smallest integer of 32 bits, and so are, if `texts`, those from a text on.
     """
 
 def card_fields(data: bytes, offsets: Int64, most: int, whole: bool) -> tuple[Int64, Int64, Uint8]:

@@ -10,6 +10,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <array>
 #include <vector>
 
 namespace meshfix {
@@ -54,6 +55,14 @@ Matrix<T> to_numpy(std::vector<T>&& values, std::size_t columns) {
     T* data = nullptr;
     const nb::capsule owner = keep(std::move(values), data);
     return Matrix<T>(data, {rows, columns}, owner);
+}
+
+template <class T, std::size_t COLUMNS>
+Matrix<T> to_numpy(std::vector<std::array<T, COLUMNS>>&& values) {
+    const std::size_t rows = values.size();
+    std::array<T, COLUMNS>* data = nullptr;
+    const nb::capsule owner = keep(std::move(values), data);
+    return Matrix<T>(rows == 0 ? nullptr : data->data(), {rows, COLUMNS}, owner);
 }
 
 // Calls f with the dimension as a compile-time constant, without the interpreter lock.

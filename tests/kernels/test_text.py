@@ -280,7 +280,7 @@ def test_a_short_card_does_not_lend_its_kind_to_the_next() -> None:
 def test_a_line_that_continues_a_card_does_not_reach_beyond_the_fields_that_are_asked_for() -> None:
     short, blank = b"CTETRA         1       1       7\n+              9\n", b"CTETRA\n"
     deck, at = short + blank, np.array([0, len(short)])
-    none = np.iinfo(np.int64).min
+    none = np.iinfo(np.int32).min
     values, bad = kernels.card_integers(deck, at, 0, 6, False)
     assert bad == -1
     assert values.tolist() == [[1, 1, 7, none, none, none], [none] * 6]
@@ -328,9 +328,43 @@ def test_free_lines_are_read_alike_in_one_pass_and_by_their_fields(random: np.ra
         lines = free_lines(random)
         quick, slow = (kernels.find_cards(b"\n".join([*some, b""])) for some in (lines, [one + b"$" for one in lines]))
         assert bytes(quick[0]) == bytes(slow[0])
-        np.testing.assert_array_equal(quick[1], slow[1])
-        np.testing.assert_array_equal(quick[3], slow[3])
-        np.testing.assert_array_equal(quick[4], slow[4])
+        for i in (1, 3, 4, 5):
+            np.testing.assert_array_equal(quick[i], slow[i])
+
+
+def column_lines(random: np.random.Generator) -> list[bytes]:
+    """Fields in columns of 8 and 16: numbers at either side, cut at the last or not, and what is none."""
+    words = [b"", b"", *b"1 23 1234567 12345678 0 007 -4 +5 1.5 THRU 7$8".split(), b"1 2"]
+    names = b"CTETRA CTETRA CTETRA CTETRA GRID GRID* * + +A CT".split()
+    lines = []
+    for _ in range(400):
+        name = names[random.integers(0, len(names))]
+        count, width = int(random.integers(0, 11)), 16 if name.endswith(b"*") else 8
+        plain = random.random() < 0.6
+        fields = [words[i] for i in random.integers(0, 8 if plain else len(words), count)]
+        sides = [bytes.ljust if plain or random.random() < 0.5 else bytes.rjust for _ in fields]
+        line = name.ljust(8) + b"".join(side(word, width) for side, word in zip(sides, fields, strict=True))
+        lines.append(line.rstrip() if random.random() < 0.5 else line)
+    return lines
+
+
+def test_lines_of_columns_are_read_alike_in_one_pass_and_by_their_fields(random: np.random.Generator) -> None:
+    """A tab in another card of the text makes all of its lines be looked at for tabs, and none be read in one pass."""
+    for _ in range(20):
+        lines = column_lines(random)
+        quick, slow = (kernels.find_cards(b"\n".join([*lines, last])) for last in (b"ENDDATA \n", b"ENDDATA\t\n"))
+        for one, other in zip(quick, slow, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
+def test_integers_of_columns_are_those_that_stand_there() -> None:
+    numbers = [7, 1234567, 12345678, 123456789, 2147483647, 2147483648, 1234567890123456]
+    for number in numbers:
+        for field in (f"{number:<16}", f"{number:>16}", f"{number:^16}"):
+            deck = f"GRID*   {field}\nENDDATA\n".encode()
+            assert kernels.card_integers(deck, np.array([0]), 0, 1, False)[0].tolist() == [[number]]
+            found = kernels.find_cards(deck)[4][0, 0]
+            assert found == (number if number < 2**31 else np.iinfo(np.int32).min + 1)
 
 
 def test_short_lists_are_read_as_others_are(random: np.random.Generator) -> None:

@@ -49,7 +49,7 @@ nb::tuple find_cards_py(const nb::bytes& data) {
     Cards cards = find_cards(CardText::searched(view_of(data)));
     return nb::make_tuple(to_numpy(std::move(cards.names), 8), to_numpy(std::move(cards.kinds)),
                           to_numpy(std::move(cards.begin)), to_numpy(std::move(cards.fields)),
-                          to_numpy(std::move(cards.heads), Cards::HEAD));
+                          to_numpy(std::move(cards.labels)), to_numpy(std::move(cards.nodes)));
 }
 
 nb::tuple card_fields_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t most, bool whole) {
@@ -61,7 +61,7 @@ nb::tuple card_fields_py(const nb::bytes& data, const Vector<const std::int64_t>
     const CardText deck = close ? CardText::between(any.text, offsets(0), offsets(count - 1)) : any;
     CardFields cards(count);
     for (std::int64_t i = 0; i < count; ++i) add_card(i + 1 < count ? deck : any, offsets(i), most, whole, cards);
-    return nb::make_tuple(to_numpy(std::move(cards.spans), 2), to_numpy(std::move(cards.starts)), to_numpy(std::move(cards.widths)));
+    return nb::make_tuple(to_numpy(std::move(cards.spans)), to_numpy(std::move(cards.starts)), to_numpy(std::move(cards.widths)));
 }
 
 auto card_integers_py(const nb::bytes& data, const Vector<const std::int64_t>& offsets, std::int64_t first, std::int64_t last,

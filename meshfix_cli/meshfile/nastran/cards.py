@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,9 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.tables import Int64
 from meshfix_cli.meshfile.text import Spans, in_line, not_a_number, unmarked
 
-BLANK = np.iinfo(np.int64).min  # an integer that is not there
+Integer = TypeVar("Integer", bound=np.integer[Any])
+
+BLANK = np.iinfo(np.int32).min  # an integer that is not there
 _OTHER = BLANK + 1  # something else is
 
 
@@ -42,7 +44,7 @@ class Fields(NamedTuple):
 
     def columns(self, first: int, last: int) -> Spans:
         """Return the spans (k, last - first, 2) of some fields of each card, -1 for those that a card has not."""
-        if (np.diff(self.starts) == last).all():
+        if self._all_have(last):
             return self.spans.reshape(-1, last, 2)[:, first:]
         spans = np.full((len(self.at), last - first, 2), -1)
         where, which = self._places(first, last)
@@ -51,10 +53,15 @@ class Fields(NamedTuple):
 
     def widths_of(self, first: int, last: int) -> NDArray[np.uint8]:
         """Return the columns (k, last - first) of the same."""
+        if self._all_have(last):
+            return self.widths.reshape(-1, last)[:, first:]
         widths = np.zeros((len(self.at), last - first), dtype=np.uint8)
         where, which = self._places(first, last)
         widths[where] = self.widths[which]
         return widths
+
+    def _all_have(self, count: int) -> bool:
+        return bool((np.diff(self.starts) == count).all())
 
     def _places(self, first: int, last: int) -> tuple[NDArray[np.bool_], Int64]:
         which = self.starts[:-1, None] + np.arange(first, last)
@@ -65,6 +72,13 @@ class Fields(NamedTuple):
         """Return the text of all fields of each card."""
         found = [self.text[max(begin, 0) : max(end, 0)].decode("latin-1").upper() for begin, end in self.spans.tolist()]
         return [found[begin:end] for begin, end in pairwise(self.starts.tolist())]
+
+
+def some_of(values: NDArray[Integer], rows: Int64) -> NDArray[Integer]:
+    """Return the values of some rows, ascending, without a copy where these follow one another."""
+    if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
+        return values[rows[0] : rows[-1] + 1]
+    return values[rows]
 
 
 def is_number(word: str) -> bool:
@@ -81,30 +95,32 @@ class Deck:
     text : bytes
     names : list of str
         The different names of cards.
-    kinds : (n,) int64
+    kinds : (n,) int32
         Which of these each card has.
     begin : (n,) int64
         Where the cards begin.
     filled : (n,) int64
         How many fields they have, up to the last that is not blank; -1: what follows continues another.
-    heads : (n, 6) int64
+    labels : (n, 2) int32
+    nodes : (n, 4) int32
         Integers in the first fields of their first lines.
     """
 
     text: bytes
     names: list[str]
-    kinds: Int64
+    kinds: NDArray[np.int32]
     begin: Int64
     filled: Int64
-    heads: Int64
+    labels: NDArray[np.int32]
+    nodes: NDArray[np.int32]
 
     @classmethod
     def of(cls, data: bytes) -> Deck:
         """Find the cards; ReadError where there may be others elsewhere, or several meshes."""
         text = unmarked(data)
-        names, *cards = kernels.find_cards(text)
+        names, kinds, begin, filled, labels, nodes = kernels.find_cards(text)
         known = [name.tobytes().rstrip(b"\0").decode("latin-1") for name in names]
-        return cls(text, known, *cards)._bulk()
+        return cls(text, known, kinds, begin, filled, labels, nodes)._bulk()
 
     def _bulk(self) -> Deck:
         """Return what stands between BEGIN BULK, or the beginning of the file, and ENDDATA."""
@@ -117,8 +133,8 @@ class Deck:
         kinds = self.kinds[first:last]
         there = np.bincount(kinds, minlength=len(self.names))
         names = [name if count else "" for name, count in zip(self.names, there.tolist(), strict=False)]
-        cards = (values[first:last] for values in (self.begin, self.filled, self.heads))
-        deck = Deck(self.text, names, kinds, *cards)
+        here = slice(first, last)
+        deck = Deck(self.text, names, kinds, self.begin[here], self.filled[here], self.labels[here], self.nodes[here])
         for name, what in (("INCLUDE", "includes other files"), ("=", "repeats cards by =")):
             if len(rows := deck.where(name)):
                 raise in_line(self.text, int(deck.begin[rows[0]]), f"{what}, which meshfix does not read")
@@ -136,7 +152,7 @@ class Deck:
         at = self._begin(rows)
         return Fields(self.text, at, *kernels.card_fields(self.text, at, most or len(self.text), whole))
 
-    def integers(self, rows: Int64, first: int, last: int, *, texts: bool = False) -> Int64:
+    def integers(self, rows: Int64, first: int, last: int, *, texts: bool = False) -> NDArray[Any]:
         """Return the integers (k, last - first) in fields of some cards, `BLANK` where there are none.
 
         Parameters
@@ -144,25 +160,21 @@ class Deck:
         texts : bool
             A text ends what there is of a card.
         """
-        if last <= self.heads.shape[1]:
-            values = self._some(self.heads, rows)[:, first:last]
-            if not (values == _OTHER).any():
-                return values
-        values, bad = kernels.card_integers(self.text, self._begin(rows), first, last, texts)
+        for heads, begin in ((self.labels, 0), (self.nodes, 2)):
+            if begin <= first and last <= begin + heads.shape[1]:
+                values = some_of(heads, rows)[:, first - begin : last - begin]
+                if not values.size or values.min() > _OTHER or not (values == _OTHER).any():
+                    return values
+        read, bad = kernels.card_integers(self.text, self._begin(rows), first, last, texts)
         if bad >= 0:
             raise not_a_number(self.text, bad, "an integer")
-        return values
-
-    @staticmethod
-    def _some(values: Int64, rows: Int64) -> Int64:
-        """Return some values, without a copy where they follow one another."""
-        if len(rows) and rows[-1] - rows[0] == len(rows) - 1:
-            return values[rows[0] : rows[-1] + 1]
-        return values[rows]
+        return read
 
     def _begin(self, rows: Int64) -> Int64:
-        self.check(rows, self.filled[rows] >= 0, "what follows the card bears the name of what continues another")
-        return np.ascontiguousarray(self.begin[rows])
+        self.check(
+            rows, some_of(self.filled, rows) >= 0, "what follows the card bears the name of what continues another"
+        )
+        return np.ascontiguousarray(some_of(self.begin, rows))
 
     def check(self, rows: Int64, good: NDArray[np.bool_], what: str) -> None:
         """Raise ReadError with the line of the first of some cards that is not good."""

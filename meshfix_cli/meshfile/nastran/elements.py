@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.nastran.cards import BLANK, Deck, is_number
+from meshfix_cli.meshfile.nastran.cards import BLANK, Deck, is_number, some_of
 from meshfix_cli.meshfile.source import Cells
 from meshfix_cli.meshfile.splice import Places
 from meshfix_cli.meshfile.tables import Int64, Numbering, Runs, alike
@@ -56,8 +56,9 @@ def elements(deck: Deck, points: Numbering) -> Runs:
     runs = Runs()
     rows = deck.where(*_SHAPES)
     corners = np.array([_corners_of(name) for name in deck.names], dtype=np.int64)
-    more = deck.filled[rows] > 2 + corners[deck.kinds[rows]]
-    for some in alike(deck.kinds[rows], more):
+    kinds = some_of(deck.kinds, rows)
+    more = some_of(deck.filled, rows) > 2 + corners[kinds]
+    for some in alike(kinds, more):
         _add_shapes(deck, rows[some], bool(more[some[0]]), points, runs)
     for name in deck.names:
         if name in _LINES:
@@ -77,9 +78,10 @@ def _add_shapes(deck: Deck, rows: Int64, more: bool, points: Numbering, runs: Ru
     shape, most = _SHAPES[name]
     corners = _corners_of(name)
     columns = np.array(ORDER.get(name, range(most if more else corners))) + 2
-    numbers = deck.integers(rows, 0, columns.max() + 1, texts=more)
-    ids, properties, nodes = np.ascontiguousarray(numbers[:, 0]), numbers[:, 1], _taken(numbers[:, 2:], columns - 2)
-    if numbers.min() <= 0:
+    labels = deck.integers(rows, 0, 2)
+    ids, properties = np.ascontiguousarray(labels[:, 0]), labels[:, 1]
+    nodes = _taken(deck.integers(rows, 2, columns.max() + 1, texts=more), columns - 2)
+    if min(labels.min(), nodes.min()) <= 0:
         nodes = np.where(nodes == BLANK, 0, nodes)
         good = (ids != BLANK) & (nodes[:, :corners] > 0).all(axis=1)
         deck.check(rows, good, f"{name} lacks a number of a point, or its own")

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+import meshio
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
@@ -111,6 +112,11 @@ def openfoam(binary: bool) -> Callable[[Path, Points, Tets], None]:
     return write
 
 
+def through_meshio(name: str) -> Callable[[Path, Points, Tets], None]:
+    """Return what lets meshio write a format of binary arrays."""
+    return lambda path, points, tets: meshio.write(path, meshio.Mesh(points, [("tetra", tets)]), file_format=name)
+
+
 _CTETRA = "CTETRA  %-8d1       %-8d%-8d%-8d%-8d\n"
 FORMATS: dict[str, tuple[str, Callable[[Path, Points, Tets], None]]] = {
     "VTK": ("vtk42", vtk),
@@ -121,6 +127,8 @@ FORMATS: dict[str, tuple[str, Callable[[Path, Points, Tets], None]]] = {
         nastran("GRID*   %-16d                %16.13f%16.13f\n*       %16.13f\n", _CTETRA),
     ),
     "Nastran, free": ("nastran", nastran("GRID,%d,,%.13f,%.13f,%.13f\n", "CTETRA,%d,1,%d,%d,%d,%d\n")),
+    "XDMF": ("xdmf", through_meshio("xdmf")),
+    "Exodus": ("exodus", through_meshio("exodus")),
     "OpenFOAM, text": ("openfoam", openfoam(binary=False)),
     "OpenFOAM, binary": ("openfoam", openfoam(binary=True)),
 }

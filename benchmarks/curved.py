@@ -1,8 +1,8 @@
 """Elements of second order against gmsh's optimisers with the boundary held: `python benchmarks/curved.py [MESH ...]`.
 
 Both get the same mesh in one run: coarse ones that gmsh makes around what is round, or files that it reads. Of each
-result: invalid elements, the smallest coefficient of a Jacobian determinant relative to the straight element, by
-meshfix's own judge, and CPU seconds of the algorithm alone.
+result: invalid elements, the smallest coefficient of a Jacobian determinant relative to the straight element, the
+smallest scaled Jacobian at a node, both by meshfix's own judge, and CPU seconds of the algorithm alone.
 """
 
 from __future__ import annotations
@@ -33,13 +33,14 @@ LONGEST = 300  # seconds for an optimiser
 OPTIMISERS = {"HighOrder": "HighOrder", "Elastic": "HighOrderElastic", "FastCurving": "HighOrderFastCurving"}
 
 
-def figures(document: Document) -> tuple[int, float]:
-    """Return how many elements are invalid, and the smallest coefficient."""
+def figures(document: Document) -> tuple[int, str]:
+    """Return how many elements are invalid, and the smallest coefficient and scaled Jacobian."""
     mesh = document.mesh
-    if mesh.quadratic is None:  # straight
-        return mesh.check()[0], 1.0
+    if mesh.quadratic is None:
+        return mesh.check()[0], "straight"
     found = mesh.quadratic.judge(mesh.points, 1)
-    return int((found.verdicts != VALID).sum()), float(found.smallest.min())
+    smallest = f"{found.smallest.min():.3f} {found.scaled_jacobians.min():.3f}"
+    return int((found.verdicts != VALID).sum()), smallest
 
 
 def timed(action: Callable[[], Any]) -> tuple[Any, float]:
@@ -48,7 +49,7 @@ def timed(action: Callable[[], Any]) -> tuple[Any, float]:
     return action(), time.process_time() - start
 
 
-def repaired(document: Document, smooth: Any = "auto") -> tuple[int, float, float, str]:
+def repaired(document: Document, smooth: Any = "auto") -> tuple[int, str, float, str]:
     """Run meshfix; return the figures, CPU seconds and what it proves or offers."""
     outcome, seconds = timed(lambda: Method(smooth=smooth).solve(document.mesh, math.inf, 1))
     left, smallest = figures(replace(document, mesh=outcome.after))
@@ -68,7 +69,7 @@ def begin() -> None:
     gmsh.option.setNumber("General.NumThreads", 1)
 
 
-def optimised(path: Path, method: str) -> tuple[int, float, float]:
+def optimised(path: Path, method: str) -> tuple[int, str, float]:
     """Run an optimiser of gmsh; return the figures and CPU seconds."""
     begin()
     gmsh.open(str(path))
@@ -108,7 +109,7 @@ def main() -> None:
     parser.add_argument("--with", dest="method", choices=OPTIMISERS.values(), help="print what this makes of a mesh")
     given = parser.parse_args()
     if given.method:
-        print("{} {:.3f} {:.2f} s".format(*optimised(Path(given.meshes[0]), given.method)))
+        print("{} {} {:.2f} s".format(*optimised(Path(given.meshes[0]), given.method)))
         return
     table = Table("mesh", "elements", "as it is", "meshfix", "best", *OPTIMISERS, "left")
     begin()
@@ -119,8 +120,8 @@ def main() -> None:
                 continue
             ours, best = repaired(document), repaired(document, "best")
             others = [by_gmsh(path, method) for method in OPTIMISERS.values()]
-            mine = [f"{left} {smallest:.3f} {seconds:.2f} s" for left, smallest, seconds, _ in (ours, best)]
-            cells = ["{} {:.3f}".format(*figures(document)), *mine, *others]
+            mine = [f"{left} {smallest} {seconds:.2f} s" for left, smallest, seconds, _ in (ours, best)]
+            cells = ["{} {}".format(*figures(document)), *mine, *others]
             table.add_row(name, str(document.mesh.topology.m), *cells, ours[3])
     Console(width=200).print(table)
 

@@ -34,6 +34,7 @@ RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
 MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
 SHRINK = 0.4  # of eps from one minimisation to the next
 POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far as the second
+POOR_JACOBIAN = 0.2  # scaled, at nodes: to raise coefficients above `RAISED` takes no element below
 STEP, LEAST_STEP = 0.1, 0.02  # of the floor
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
@@ -115,6 +116,7 @@ class _Run:
         found = self.mesh.judge(self.points, self.limits.threads)
         self.invalid, self.low = found.verdicts != VALID, found.smallest <= 0
         self.left, self.smallest = int(self.invalid.sum()), float(found.smallest.min(initial=math.inf))
+        self.jacobians = found.scaled_jacobians
 
     def _rank(self) -> tuple[int, float]:
         """Smaller is better: fewer invalid elements, then larger coefficients of those that depend on a free node."""
@@ -122,13 +124,13 @@ class _Run:
 
     def _try(self, name: str, points: Array) -> Iterator[Step]:
         """Take points if they are better."""
-        before, rank = (self.points, self.left, self.smallest, self.invalid, self.low), self._rank()
+        before, rank = (self.points, self.left, self.smallest, self.invalid, self.low, self.jacobians), self._rank()
         self.points = points
         self._look()
         if self._rank() < rank:
             yield name, points
         else:
-            self.points, self.left, self.smallest, self.invalid, self.low = before
+            self.points, self.left, self.smallest, self.invalid, self.low, self.jacobians = before
 
     def untangle(self, regions: tuple[int, ...] = RINGS) -> Iterator[Step]:
         """Look for valid positions: of the nodes between corners, and where these do not suffice of corners as well."""
@@ -182,6 +184,7 @@ class _Run:
     def raise_to(self, highest: float) -> Iterator[Step]:
         """Raise the smallest coefficients, those of nodes first; elements that held nodes keep low are left out."""
         inner = self.free & ~self.mesh.corners
+        self.least = self.mesh.kernel.sizes(self.points, self.limits.threads)
         yield from self._raise(inner, highest)
         if self.smallest < POOR or highest == 1:
             yield from self._raise(self.free, highest)
@@ -189,7 +192,8 @@ class _Run:
     def _raise(self, free: Mask, highest: float) -> Iterator[Step]:
         step = floor = STEP
         while floor < highest and step >= LEAST_STEP:
-            self.rest, self.sizes = self.points, self.mesh.kernel.sizes(self.points, self.limits.threads)
+            sizes = self.mesh.kernel.sizes(self.points, self.limits.threads)
+            self.rest, self.sizes = self.points, np.maximum(sizes, self.least)
             stuck = self._smallest(free, of_free=False) <= floor
             if stuck.all():
                 return
@@ -198,7 +202,7 @@ class _Run:
             for rings in RAISING_RINGS:
                 if raised is None:
                     raised = self._above(free & self.mesh.near(low, rings), floor)
-            if raised is None:
+            if raised is None or self._costs_too_much(raised, floor):
                 step /= 2
                 floor -= step
                 continue
@@ -207,6 +211,17 @@ class _Run:
                 if self.points is not raised:
                     return
             floor += step
+
+    def _costs_too_much(self, raised: Array, floor: float) -> bool:
+        """Whether the smallest scaled Jacobian falls where coefficients rise, or above `RAISED` any that is poor then.
+
+        Relative to the straight element coefficients rise as well where that becomes thin.
+        """
+        before, after = self.jacobians, self.mesh.judge(raised, self.limits.threads).scaled_jacobians
+        if floor > RAISED:
+            return bool((after < np.minimum(before, POOR_JACOBIAN)).any())
+        changed = after != before
+        return bool(after[changed].min(initial=math.inf) < before[changed].min(initial=math.inf))
 
     def _smallest(self, free: Mask, of_free: bool) -> Array:
         return self.mesh.kernel.smallest(self.points, self.sizes, free.astype(np.uint8), of_free, self.limits.threads)

@@ -244,6 +244,24 @@ def test_meshes_around_round_things_become_valid_or_that_is_impossible(tmp_path:
     assert sum(before > 0 for _, before, _ in seen) >= 2, seen
 
 
+@pytest.mark.parametrize(("h", "width"), [(0.1, 0.03), (0.15, 0.05), (0.2, 0.03)])
+def test_coefficients_are_not_raised_by_making_elements_thin(tmp_path: Path, h: float, width: float) -> None:
+    """Relative to the straight element they rise there as well, as around a slit that few elements resolve."""
+    with gmsh_session(ElementOrder=2, MeshSizeMin=h, MeshSizeMax=h) as gmsh:
+        occ = gmsh.model.occ
+        occ.fragment([(2, occ.addRectangle(-0.5, -0.5, 0, 1, 1))], [(2, occ.addDisk(0, 0, 0, 0.2, width))])
+        occ.synchronize()
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(tmp_path / "slit.msh"))
+    mesh = read(tmp_path / "slit.msh").mesh
+    assert mesh.quadratic is not None
+    after = [Method(smooth=smooth).solve(mesh, float("inf"), 1).after.points for smooth in (0, "auto", "best")]
+    left, usual, best = (mesh.quadratic.judge(points, 1) for points in after)
+    assert (left.verdicts == VALID).all()
+    assert usual.smallest.min() > left.smallest.min()
+    assert left.scaled_jacobians.min() <= usual.scaled_jacobians.min() < best.scaled_jacobians.min()
+
+
 SQUARE, TRIANGLES = grid(*[np.linspace(0, 1, 5)] * 2)
 
 

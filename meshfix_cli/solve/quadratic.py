@@ -15,7 +15,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -34,7 +34,7 @@ RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
 MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
 SHRINK = 0.4  # of eps from one minimisation to the next
 POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far as the second
-POOR_JACOBIAN = 0.2  # scaled, at nodes: to raise coefficients above `RAISED` takes no element below
+POOR_JACOBIAN = 0.2  # scaled, at nodes
 STEP, LEAST_STEP = 0.1, 0.02  # of the floor
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
@@ -100,37 +100,51 @@ def steps(
     """
     run = _Run(mesh, points, limits, budget)
     yield from run.untangle()
-    if floor is not None and run.left == 0 and (floor == 1 or run.smallest < POOR):
+    if floor is not None and run.left == 0 and (floor == 1 or run.now.smallest < POOR):
         yield from run.raise_to(floor)
+
+
+class _Seen(NamedTuple):
+    """Points and what is judged of them, of each element (m,) and in sum; low: it has a coefficient not above 0."""
+
+    points: Array
+    invalid: Mask
+    low: Mask
+    left: int
+    smallest: float
 
 
 class _Run:
     def __init__(self, mesh: Quadratic, points: Array, limits: Limits, budget: Budget | None = None) -> None:
-        self.mesh, self.limits, self.points, self.rest = mesh, limits, points, points
+        self.mesh, self.limits, self.rest = mesh, limits, points
         self.budget = budget or Budget()
         self.free = limits.free & mesh.used
         self.sizes = mesh.kernel.sizes(points, limits.threads)
-        self._look()
+        self.now = self._seen(points)
 
-    def _look(self) -> None:
-        found = self.mesh.judge(self.points, self.limits.threads)
-        self.invalid, self.low = found.verdicts != VALID, found.smallest <= 0
-        self.left, self.smallest = int(self.invalid.sum()), float(found.smallest.min(initial=math.inf))
-        self.jacobians = found.scaled_jacobians
+    @property
+    def points(self) -> Array:
+        return self.now.points
 
-    def _rank(self) -> tuple[int, float]:
+    @property
+    def left(self) -> int:
+        return self.now.left
+
+    def _seen(self, points: Array) -> _Seen:
+        found = self.mesh.judge(points, self.limits.threads)
+        invalid, smallest = found.verdicts != VALID, float(found.smallest.min(initial=math.inf))
+        return _Seen(points, invalid, found.smallest <= 0, int(invalid.sum()), smallest)
+
+    def _rank(self, seen: _Seen) -> tuple[int, float]:
         """Smaller is better: fewer invalid elements, then larger coefficients of those that depend on a free node."""
-        return self.left, -float(self._smallest(self.free, of_free=True).min(initial=math.inf))
+        return seen.left, -float(self._smallest(seen.points, self.free, of_free=True).min(initial=math.inf))
 
     def _try(self, name: str, points: Array) -> Iterator[Step]:
         """Take points if they are better."""
-        before, rank = (self.points, self.left, self.smallest, self.invalid, self.low, self.jacobians), self._rank()
-        self.points = points
-        self._look()
-        if self._rank() < rank:
+        found = self._seen(points)
+        if self._rank(found) < self._rank(self.now):
+            self.now = found
             yield name, points
-        else:
-            self.points, self.left, self.smallest, self.invalid, self.low, self.jacobians = before
 
     def untangle(self, regions: tuple[int, ...] = RINGS) -> Iterator[Step]:
         """Look for valid positions: of the nodes between corners, and where these do not suffice of corners as well."""
@@ -139,11 +153,11 @@ class _Run:
                 yield from self._programmes(free)
             for rings in regions:
                 if self.left:
-                    yield from self._minimise(free & self.mesh.near(self.low, rings))
+                    yield from self._minimise(free & self.mesh.near(self.now.low, rings))
 
     def _programmes(self, free: Mask) -> Iterator[Step]:
         """Sweeps of the linear programme over the nodes of elements that are not certified; the best ones are kept."""
-        corners, points, low = self.mesh.corners, self.points, self.low
+        corners, points, low = self.mesh.corners, self.points, self.now.low
         best = (int(low.sum()), points)
         for _ in range(CYCLES):
             for some, tied in ((~corners, False), (corners, True)):
@@ -183,59 +197,78 @@ class _Run:
 
     def raise_to(self, highest: float) -> Iterator[Step]:
         """Raise the smallest coefficients, those of nodes first; elements that held nodes keep low are left out."""
-        inner = self.free & ~self.mesh.corners
         self.least = self.mesh.kernel.sizes(self.points, self.limits.threads)
-        yield from self._raise(inner, highest)
-        if self.smallest < POOR or highest == 1:
-            yield from self._raise(self.free, highest)
+        for free in (self.free & ~self.mesh.corners, self.free):
+            if free is not self.free or self.now.smallest < POOR or highest == 1:
+                self.refused = False
+                yield from self._raise(free, highest)
+                if self.refused:
+                    yield from self._raise(free, highest, patient=True)
 
-    def _raise(self, free: Mask, highest: float) -> Iterator[Step]:
-        step = floor = STEP
+    def _raise(self, free: Mask, highest: float, patient: bool = False) -> Iterator[Step]:
+        """Raise coefficients step by step; patient: what costs too much is not taken, but gone on from."""
+        step, floor, kept, quality = STEP, STEP, self.now, self._quality(self.now)
         while floor < highest and step >= LEAST_STEP:
             sizes = self.mesh.kernel.sizes(self.points, self.limits.threads)
             self.rest, self.sizes = self.points, np.maximum(sizes, self.least)
-            stuck = self._smallest(free, of_free=False) <= floor
+            stuck = self._smallest(self.points, free, of_free=False) <= floor
             if stuck.all():
-                return
-            low = ~stuck & (self._smallest(free, of_free=True) <= floor)
-            raised = None if low.any() else self.points
+                break
+            low = ~stuck & (self._smallest(self.points, free, of_free=True) <= floor)
+            found = None if low.any() else self.now
             for rings in RAISING_RINGS:
-                if raised is None:
-                    raised = self._above(free & self.mesh.near(low, rings), floor)
-            if raised is None or self._costs_too_much(raised, floor):
+                found = found or self._above(free & self.mesh.near(low, rings), floor)
+            reached = quality if found is None or found is kept else self._quality(found)
+            costly = _costs_too_much(quality, reached, floor)
+            self.refused |= costly
+            if found is None or (costly and not patient):
                 step /= 2
                 floor -= step
                 continue
-            if raised is not self.points:
-                yield from self._try(RAISING, raised)
-                if self.points is not raised:
-                    return
+            if found is not self.now:
+                if self._rank(found) >= self._rank(self.now):
+                    break
+                self.now = found
+                if not costly:
+                    kept, quality = found, reached
+                    yield RAISING, found.points
             floor += step
+        self.now = kept
 
-    def _costs_too_much(self, raised: Array, floor: float) -> bool:
-        """Whether the smallest scaled Jacobian falls where coefficients rise, or above `RAISED` any that is poor then.
+    def _quality(self, seen: _Seen) -> Array:
+        """Return the smallest scaled Jacobian (m,) of each element at its nodes, and as a straight one."""
+        both = (
+            self.mesh.judge(points, self.limits.threads) for points in (seen.points, self.mesh.straight(seen.points))
+        )
+        return np.minimum(*(found.scaled_jacobians for found in both))
 
-        Relative to the straight element coefficients rise as well where that becomes thin.
-        """
-        before, after = self.jacobians, self.mesh.judge(raised, self.limits.threads).scaled_jacobians
-        if floor > RAISED:
-            return bool((after < np.minimum(before, POOR_JACOBIAN)).any())
-        changed = after != before
-        return bool(after[changed].min(initial=math.inf) < before[changed].min(initial=math.inf))
+    def _smallest(self, points: Array, free: Mask, of_free: bool) -> Array:
+        return self.mesh.kernel.smallest(points, self.sizes, free.astype(np.uint8), of_free, self.limits.threads)
 
-    def _smallest(self, free: Mask, of_free: bool) -> Array:
-        return self.mesh.kernel.smallest(self.points, self.sizes, free.astype(np.uint8), of_free, self.limits.threads)
-
-    def _above(self, region: Mask, floor: float) -> Array | None:
+    def _above(self, region: Mask, floor: float) -> _Seen | None:
         """Return points where all coefficients that depend on a region's nodes are above a floor, if they are found."""
         if not region.any():
             return None
         energy, eps = self._energy(region), RAISING_EPS
         for _ in range(RAISING_MINIMISATIONS):
             if energy.minimise(eps, floor, RAISING_ITERATIONS)[2] > floor:
-                return energy.points(self.points.shape[1])
+                return self._seen(energy.points(self.points.shape[1]))
             eps *= RAISING_SHRINK
         return None
+
+
+def _costs_too_much(before: Array, after: Array, floor: float) -> bool:
+    """Whether the worst quality (m,) of the elements that change falls, or above `RAISED` the sum of that of poor ones.
+
+    Relative to the straight element coefficients rise as well where that becomes thin.
+    """
+    changed = after != before
+    before, after = before[changed], after[changed]
+    if floor > RAISED:
+        before, after = np.minimum(before, POOR_JACOBIAN), np.minimum(after, POOR_JACOBIAN)
+        if after.sum() < before.sum():
+            return True
+    return bool(after.min(initial=math.inf) < before.min(initial=math.inf))
 
 
 def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array | None:
@@ -264,7 +297,7 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
         run = _Run(mesh, moved, limits)
         for _ in run.untangle(RELAXING_RINGS):
             pass
-        return run.points, run.invalid
+        return run.points, run.now.invalid
 
     found, invalid = solved(points, share)
     while invalid.any():

@@ -15,7 +15,7 @@ import re
 from dataclasses import dataclass
 from functools import cache, cached_property
 
-from meshfix_cli.mesh.lagrange import Kind, kinds
+from meshfix_cli.mesh.lagrange import Kind, kinds, lobatto_kinds
 
 Rows = tuple[tuple[int, ...], ...]
 Weights = tuple[tuple[float, ...], ...]
@@ -273,7 +273,7 @@ def element_of(key: str) -> Element | None:
 
 @cache
 def _of_any_order(key: str) -> Element | None:
-    kind = kinds().get(key)
+    kind = kinds().get(key) or lobatto_kinds().get(key)
     return None if kind is None else Element(key, ELEMENTS[kind.family].shape, len(kind.places()), lattice=kind)
 
 

@@ -1,4 +1,4 @@
-// An energy of elements of second order that is small where no Bezier coefficient of det J is small:
+// An energy of curved elements that is small where no Bezier coefficient of det J is small:
 //
 //     sum over elements of  mean over coefficients of (1 + t^2) / chi(t)
 //                           + STRAIGHT sum over directions of mean |D - D0|^2 / mean |D0|^2,
@@ -24,7 +24,7 @@ struct QuadraticGoal {
 
 // What is minimised over: the elements that have a free node. Variables are the steps of these from where they are, each in a
 // unit of its own.
-template <int D>
+template <int D, class R>
 class QuadraticEnergy {
    public:
     QuadraticGoal goal{};
@@ -36,8 +36,8 @@ class QuadraticEnergy {
         for (std::int64_t v = 0; v < mesh.n; ++v)
             if (free[v] && mesh.at_offsets[v] < mesh.at_offsets[v + 1]) moving_.push_back(static_cast<std::int32_t>(v));
         for (std::int64_t e = 0; e < mesh.size(); ++e) {
-            const std::uint32_t here = mesh.marked(free, e);
-            if (here == 0) continue;
+            const NodeSet here = mesh.marked(free, e);
+            if (!here.any()) continue;
             elements_.push_back(static_cast<std::int32_t>(e));
             free_.push_back(here);
             sizes_.push_back(sizes[e]);
@@ -88,7 +88,7 @@ class QuadraticEnergy {
         double energy = 0.0, smallest = INFINITY;
     };
     struct Rest {
-        std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3> difference;
+        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> difference;
         std::array<double, 3> stiffness;  // for each direction what |D - D0|^2 is multiplied by
     };
 
@@ -96,11 +96,11 @@ class QuadraticEnergy {
 
     void at_rest(std::int64_t e, const double* rest) {
         const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D> parts(type, straightened<D>(type, mesh_->local<D>(rest, e)));
+        const QuadraticParts<D, R> parts(type, straightened<D, R>(type, mesh_->local<D, R>(rest, e)));
         Rest found{parts.difference, {}};
         for (int j = 0; j < D; ++j) {
             double sum = 0.0;
-            for (std::size_t p = 0; p < type.difference[j].size(); ++p) sum += norm2(parts.difference[j][p]);
+            for (std::size_t p = 0; p < type.difference[j].size(); ++p) sum += type.share2[j][p] * norm2(parts.difference[j][p]);
             found.stiffness[j] = sum > 0.0 ? QUADRATIC_STRAIGHT / sum : 0.0;
         }
         rest_.push_back(found);
@@ -150,14 +150,14 @@ class QuadraticEnergy {
     void look_at(std::int64_t i, Part& part) {
         const std::int32_t e = elements_[i];
         const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D> parts(type, mesh_->local<D>(points_.data(), e));
-        std::array<double, MOST_QUADRATIC_COEFFICIENTS> slope;
+        const QuadraticParts<D, R> parts(type, mesh_->local<D, R>(points_.data(), e));
+        std::array<double, R::COEFFICIENTS> slope;
         const double to_b = 1.0 / sizes_[i], to_t = 1.0 / (1.0 - goal.floor), share = 1.0 / type.coefficients;
         double sum = 0.0;
         for (int k = 0; k < type.coefficients; ++k) {
             const double b = parts.coefficient[k] * to_b, t = (b - goal.floor) * to_t;
             slope[k] = 0.0;
-            if ((type.depends[k] & free_[i]) == 0) continue;  // nothing can be done about it
+            if (!(type.depends[k] & free_[i]).any()) continue;  // nothing can be done about it
             const Chi<double> chi(t, goal.eps);
             const double value = (1.0 + t * t) * chi.inverse;
             sum += value;
@@ -168,14 +168,15 @@ class QuadraticEnergy {
         part.energy += share * sum + straightness(i, parts);
     }
 
-    double straightness(std::int64_t i, const QuadraticParts<D>& parts) {
-        std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3> pull{};
+    double straightness(std::int64_t i, const QuadraticParts<D, R>& parts) {
+        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> pull;
         double sum = 0.0;
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < parts.type->difference[j].size(); ++p) {
                 const Vec<D> off = parts.difference[j][p] - rest_[i].difference[j][p];
-                sum += rest_[i].stiffness[j] * norm2(off);
-                pull[j][p] = (2.0 * rest_[i].stiffness[j]) * off;
+                const double stiffness = parts.type->share2[j][p] * rest_[i].stiffness[j];
+                sum += stiffness * norm2(off);
+                pull[j][p] = (2.0 * stiffness) * off;
             }
         parts.add_to_nodes(pull, slopes_[i]);
         return sum;
@@ -196,10 +197,10 @@ class QuadraticEnergy {
     std::vector<double> points_, start_, sizes_, unit_;
     int threads_;
     std::vector<std::int32_t> moving_, elements_, place_of_;
-    std::vector<std::uint32_t> free_;
+    std::vector<NodeSet> free_;
     std::vector<Rest> rest_;
     std::vector<Part> parts_;
-    std::vector<QuadraticNodes<D>> slopes_;
+    std::vector<QuadraticNodes<D, R>> slopes_;
     std::vector<Vec<D>> centre_, inside_;  // of the balls, and the variables of these at the start
     double radius_ = INFINITY;
     double last_ = 0.0, smallest_ = INFINITY;

@@ -167,7 +167,7 @@ def descended(key: str, nodes: Array, at: Array) -> float:
 def test_verdicts_against_sampling(random: np.random.Generator, key: str) -> None:
     seen = set()
     at = np.concatenate([inside(random, key, 3000), positions(key)])
-    for nodes in doubtful(random, key, 60):
+    for nodes in doubtful(random, key, 60 if key in CODES else 20):
         verdict = mesh_of(key).judge(nodes, 1)[0][0]
         seen.add(int(verdict))
         smallest = deepest(random, key, nodes, at)

@@ -42,12 +42,13 @@ class QuadraticEnergy {
             free_.push_back(here);
             sizes_.push_back(sizes[e]);
             at_rest(e, rest);
+            slopes_at_.push_back(slopes_at_.back() + mesh.type(e).nodes);
         }
         start_ = points_;
         radius_ = reach.radius;
         centre_in(reach);
         parts_.resize(items());
-        slopes_.resize(elements_.size());
+        slopes_.resize(slopes_at_.back());
         place_of_.assign(mesh.size(), -1);
         for (std::size_t i = 0; i < elements_.size(); ++i) place_of_[elements_[i]] = static_cast<std::int32_t>(i);
         find_units();
@@ -87,23 +88,20 @@ class QuadraticEnergy {
     struct Part {
         double energy = 0.0, smallest = INFINITY;
     };
-    struct Rest {
-        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> difference;
-        std::array<double, 3> stiffness;  // for each direction what |D - D0|^2 is multiplied by
-    };
-
     std::int64_t items() const { return (static_cast<std::int64_t>(elements_.size()) + QUADRATIC_PER_ITEM - 1) / QUADRATIC_PER_ITEM; }
 
     void at_rest(std::int64_t e, const double* rest) {
         const QuadraticType& type = mesh_->type(e);
         const QuadraticParts<D, R> parts(type, straightened<D, R>(type, mesh_->local<D, R>(rest, e)));
-        Rest found{parts.difference, {}};
+        std::array<double, 3> stiffness{};
+        rest_at_.push_back(rest_.size());
         for (int j = 0; j < D; ++j) {
+            rest_.insert(rest_.end(), parts.difference[j].begin(), parts.difference[j].begin() + type.difference[j].size());
             double sum = 0.0;
             for (std::size_t p = 0; p < type.difference[j].size(); ++p) sum += type.share2[j][p] * norm2(parts.difference[j][p]);
-            found.stiffness[j] = sum > 0.0 ? QUADRATIC_STRAIGHT / sum : 0.0;
+            stiffness[j] = sum > 0.0 ? QUADRATIC_STRAIGHT / sum : 0.0;
         }
-        rest_.push_back(found);
+        stiffness_.push_back(stiffness);
     }
 
     // The variables at the start, in balls, by nodes; those that are on the rim are drawn inside.
@@ -164,21 +162,23 @@ class QuadraticEnergy {
             slope[k] = share * to_t * to_b * (2.0 * t * chi.inverse - value * chi.decay);
             if (!(b >= part.smallest)) part.smallest = b;
         }
-        slopes_[i] = parts.slopes(slope);
-        part.energy += share * sum + straightness(i, parts);
+        QuadraticNodes<D, R> slopes = parts.slopes(slope);
+        part.energy += share * sum + straightness(i, parts, slopes);
+        std::copy_n(slopes.begin(), type.nodes, slopes_.begin() + slopes_at_[i]);
     }
 
-    double straightness(std::int64_t i, const QuadraticParts<D, R>& parts) {
+    double straightness(std::int64_t i, const QuadraticParts<D, R>& parts, QuadraticNodes<D, R>& slopes) const {
+        const Vec<D>* rest = rest_.data() + rest_at_[i];
         std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> pull;
         double sum = 0.0;
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < parts.type->difference[j].size(); ++p) {
-                const Vec<D> off = parts.difference[j][p] - rest_[i].difference[j][p];
-                const double stiffness = parts.type->share2[j][p] * rest_[i].stiffness[j];
+                const Vec<D> off = parts.difference[j][p] - *rest++;
+                const double stiffness = parts.type->share2[j][p] * stiffness_[i][j];
                 sum += stiffness * norm2(off);
                 pull[j][p] = (2.0 * stiffness) * off;
             }
-        parts.add_to_nodes(pull, slopes_[i]);
+        parts.add_to_nodes(pull, slopes);
         return sum;
     }
 
@@ -187,7 +187,7 @@ class QuadraticEnergy {
         const std::int32_t v = moving_[i];
         for (std::int32_t k = mesh_->at_offsets[v]; k < mesh_->at_offsets[v + 1]; ++k) {
             const std::int32_t place = mesh_->at[k], e = mesh_->owners[place];
-            sum = sum + slopes_[place_of_[e]][place - mesh_->offsets[e]];
+            sum = sum + slopes_[slopes_at_[place_of_[e]] + place - mesh_->offsets[e]];
         }
         sum = by_step(i, sum);
         for (int k = 0; k < D; ++k) gradient[i * D + k] = unit_[i] * sum[k];
@@ -198,9 +198,10 @@ class QuadraticEnergy {
     int threads_;
     std::vector<std::int32_t> moving_, elements_, place_of_;
     std::vector<NodeSet> free_;
-    std::vector<Rest> rest_;
+    std::vector<Vec<D>> rest_, slopes_;                   // differences at rest, and slopes of nodes, of one element behind the other
+    std::vector<std::size_t> rest_at_, slopes_at_{0};
+    std::vector<std::array<double, 3>> stiffness_;        // for each direction what |D - D0|^2 is multiplied by
     std::vector<Part> parts_;
-    std::vector<QuadraticNodes<D, R>> slopes_;
     std::vector<Vec<D>> centre_, inside_;  // of the balls, and the variables of these at the start
     double radius_ = INFINITY;
     double last_ = 0.0, smallest_ = INFINITY;

@@ -14,7 +14,6 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, Rows
@@ -110,36 +109,42 @@ def higher_order(
     edges = _numbered(n, elements, facets, [_SIDES[one.key].edges for one in cells])
     # Of solids, the nodes inside a triangle or a quadrilateral are on a face.
     solid = any(ELEMENTS[one.key].shape.dimension == 3 for one in elements)
-    around = [_whole(one.key) if solid and one.key in ("triangle", "quad") else _SIDES[one.key].faces for one in cells]
-    faces = _numbered(n, elements, facets, around)
-    sizes = np.where(faces.first[:, 3] < 0, _count("triangle", order), _count("quad", order))
-    on_edges, on_faces = n, n + len(edges.first) * (order - 1)
+    sides = [_whole(one.key) if solid and one.key in ("triangle", "quad") else _SIDES[one.key].faces for one in cells]
+    faces = _numbered(n, elements, facets, sides)
+    sizes = np.where(faces.first[:, 3] < 0, len(_interior("triangle", order)), len(_interior("quad", order)))
+    on_faces = n + len(edges.first) * (order - 1)
     starts = on_faces + np.cumsum(sizes) - sizes
-    counts = [_count(one.key, order) if i < len(elements) else 0 for i, one in enumerate(cells)]
-    inside, end = _inside(on_faces + int(sizes.sum()), counts[: len(elements)], elements)
+    inside, end = _inside(on_faces + int(sizes.sum()), order, elements)
     found = []
-    for i, (one, sides) in enumerate(zip(cells, around, strict=True)):
+    for i, one in enumerate(cells):
         kind = Kind(one.key, order, True, lobatto and order > 2)
         nodes = np.empty((len(one.rows), len(kind.places())), dtype=np.int64)
         nodes[:, : one.vertices.shape[1]] = one.vertices
-        left = dict.fromkeys(range(one.vertices.shape[1], nodes.shape[1]))
-        for k, edge in enumerate(_SIDES[one.key].edges):
-            first = on_edges + edges.numbers[i][:, k] * (order - 1)
-            for column, step in _on_edge(one.key, order, edge):
-                ascending = one.vertices[:, edge[0]] < one.vertices[:, edge[1]]
-                nodes[:, column] = first + np.where(ascending, step, order - step) - 1
-                del left[column]
-        for k, face in enumerate(sides):
-            number = faces.numbers[i][:, k]
-            turned = _turned(one.vertices[:, face], faces.first[number, : len(face)])
-            for column, place in _on_face(one.key, order, face):
-                nodes[:, column] = starts[number] + _rank_on_face(order, len(face), turned, place)
-                del left[column]
-        if left:
-            ranks = sorted(left, key=lambda column: _by_coordinates(kind.places()[column]))
-            nodes[:, ranks] = inside[i]
+        _put_on_edges(nodes, one, order, n + edges.numbers[i] * (order - 1))
+        _put_on_faces(nodes, one, order, sides[i], (faces.first[faces.numbers[i]], starts[faces.numbers[i]]))
+        if i < len(elements):
+            nodes[:, [column for column, _ in _interior(one.key, order)]] = inside[i]
         found.append((key_of(kind), nodes))
     return found, end
+
+
+def _put_on_edges(nodes: Int64, cells: Linear, order: int, first: Int64) -> None:
+    """Put the nodes on edges where they stand; `first` (m, edges) is the first of each edge."""
+    for k, (a, b) in enumerate(_SIDES[cells.key].edges):
+        ascending = cells.vertices[:, a] < cells.vertices[:, b]
+        for column, step in _on_edge(cells.key, order, (a, b)):
+            nodes[:, column] = first[:, k] + np.where(ascending, step, order - step) - 1
+
+
+def _put_on_faces(nodes: Int64, cells: Linear, order: int, sides: Rows, named: tuple[Int64, Int64]) -> None:
+    """Put the nodes inside of faces where they stand.
+
+    `named` are the vertices of each face (m, faces, 4) as it is named first, and the first node of each (m, faces).
+    """
+    for k, face in enumerate(sides):
+        turned = _turned(cells.vertices[:, face], named[0][:, k, : len(face)])
+        for column, place in _on_face(cells.key, order, face):
+            nodes[:, column] = named[1][:, k] + _rank_on_face(order, len(face), turned, place)
 
 
 def _whole(key: str) -> Rows:
@@ -151,17 +156,17 @@ def _by_coordinates(place: Place) -> Place:
 
 
 @cache
-def _count(key: str, order: int) -> int:
-    """Return how many nodes are inside an element, or a face."""
-    return len(_interior(key, order))
+def _interior(key: str, order: int) -> list[tuple[int, Place]]:
+    """Return the nodes inside, in MFEM's order: where they stand in VTK's, and places; a line has them on its edge."""
+    if key == "line":
+        return []
+    places = lattice(key, order, "vtk")
+    some = [(column, places[column]) for column, here in enumerate(_between(key, order)) if len(here) == _corners(key)]
+    return sorted(some, key=lambda one: _by_coordinates(one[1]))
 
 
-@cache
-def _interior(key: str, order: int) -> list[Place]:
-    """Return the places inside, in MFEM's order."""
-    weights = Kind(key, order, True).weights
-    some = [place for place, row in zip(lattice(key, order, "vtk"), weights, strict=True) if all(row)]
-    return sorted(some, key=_by_coordinates)
+def _corners(key: str) -> int:
+    return ELEMENTS[key].shape.corners
 
 
 @cache
@@ -205,7 +210,7 @@ def _rank_on_face(order: int, width: int, turned: Int64, place: Place) -> Int64:
         at = np.stack([((np.array(place) - order * origin) * way).sum(axis=1) for way in ways], axis=1)
     interior = _interior("triangle" if width == 3 else "quad", order)
     rank = np.zeros((order, order), dtype=np.int64)
-    for i, (a, b) in enumerate(interior):
+    for i, (_, (a, b)) in enumerate(interior):
         rank[a, b] = i
     return np.asarray(rank[at[:, 0], at[:, 1]])
 
@@ -254,8 +259,9 @@ def _ranks(codes: Int64, order: Int64) -> tuple[Int64, Int64]:
     return numbers, order[np.sort(first)]
 
 
-def _inside(start: int, counts: Sequence[int], elements: Sequence[Linear]) -> tuple[list[NDArray[np.int64]], int]:
+def _inside(start: int, order: int, elements: Sequence[Linear]) -> tuple[list[Int64], int]:
     """Number the nodes (m, count) that elements have for themselves, from a number on; return also where these end."""
+    counts = [len(_interior(one.key, order)) for one in elements]
     sizes = np.zeros(sum(len(one.rows) for one in elements), dtype=np.int64)
     for one, count in zip(elements, counts, strict=True):
         sizes[one.rows] = count

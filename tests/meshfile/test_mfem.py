@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bent import curved
 from elements import MESHES
 from files_medit import surface
 from files_mfem import CORNERS, EVEN, FILES, LOBATTO, NUMBERS, nodes, of_order, text
@@ -16,11 +17,14 @@ from shapes import block, plate
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, element_of
+from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.lagrange import lattice
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.mfem import parse
+from meshfix_cli.meshfile.mfem.nodes import own_nodes
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import turned
+from meshfix_cli.repair import Method
 
 SMALL = b"""MFEM mesh v1.3
 
@@ -228,6 +232,39 @@ def test_elements_with_nodes_of_their_own_are_solved_as_one_mesh_where_points_ar
             document.source.points,
             {0: (np.array([0]), (1, 0, 2))},  # type: ignore[dict-item]
         )
+
+
+@pytest.mark.parametrize("straight", [False, True])
+def test_elements_with_nodes_of_higher_order_for_themselves_are_solved_as_one_mesh(
+    straight: bool, tmp_path: Path
+) -> None:
+    """Points that are joined stay together, and those on the boundary where they are."""
+    quadratic, points, free = curved("quad16", 0.0 if straight else 0.3)
+    if straight:
+        tangled = points.copy()
+        tangled[free & quadratic.corners] += np.random.default_rng(1).uniform(-0.4, 0.4, (4, 2))
+        points = quadratic.straight(tangled)
+    rows = quadratic.nodes.reshape(len(quadratic), -1)
+    order = np.argsort(own_nodes("quad", 3))
+    values = "\n".join(" ".join(map(repr, row)) for row in points[rows[:, order]].reshape(-1, 2).tolist())
+    elements = "\n".join(f"1 3 {' '.join(map(str, row[:4]))}" for row in rows.tolist())
+    (tmp_path / "in.mesh").write_text(
+        f"MFEM mesh v1.0\ndimension\n2\nelements\n{len(rows)}\n{elements}\nboundary\n0\nvertices\n"
+        f"{rows[:, :4].max() + 1}\nnodes\nFiniteElementSpace\nFiniteElementCollection: L2_T4_2D_P3\n"
+        f"VDim: 2\nOrdering: 1\n{values}\n"
+    )
+    document = read(tmp_path / "in.mesh", join_points=True)
+    assert (document.mesh.quadratic is None) == straight
+    assert document.mesh.check()[0] == (quadratic.judge(points, 1).verdicts != VALID).sum() > 0
+    outcome = Method().solve(document.mesh, float("inf"), 1)
+    write(document, outcome.after, tmp_path / "out.mesh")
+    again = read(tmp_path / "out.mesh", join_points=True)
+    assert again.mesh.check()[0] == 0
+    found = again.source.points.reshape(*rows.shape, -1)[:, own_nodes("quad", 3), :2]
+    for node in range(len(points)):
+        places = found[rows == node]
+        assert (places == places[0]).all()
+        assert free[node] or (places[0] == points[node]).all()
 
 
 def test_nodes_of_quadrilaterals_and_hexahedra_run_by_coordinates() -> None:

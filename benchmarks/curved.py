@@ -1,4 +1,4 @@
-"""Elements of second order against gmsh's optimisers with the boundary held: `python benchmarks/curved.py [MESH ...]`.
+"""Curved elements against gmsh's optimisers with the boundary held: `python benchmarks/curved.py [MESH ...]`.
 
 Both get the same mesh in one run: coarse ones that gmsh makes around what is round, or files that it reads. Of each
 result: invalid elements, the smallest coefficient of a Jacobian determinant relative to the straight element, the
@@ -91,13 +91,14 @@ def by_gmsh(path: Path, method: str) -> str:
     return done.stdout.splitlines()[-1] if done.returncode == 0 else "ended"
 
 
-def cases(names: list[str], folder: Path) -> Iterator[tuple[str, Path]]:
-    """Give names and files: those that are given, or made ones."""
+def cases(names: list[str], folder: Path, order: int) -> Iterator[tuple[str, Path]]:
+    """Give names and files: those that are given, or made ones of an order."""
     if names:
         yield from ((Path(name).name, Path(name)) for name in names)
         return
     for name in made(gmsh):
         path = folder / "mesh.msh"
+        gmsh.model.mesh.setOrder(order)
         gmsh.write(str(path))
         yield name, path
 
@@ -106,6 +107,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
     parser.add_argument("meshes", nargs="*", metavar="MESH")
+    parser.add_argument("--order", type=int, default=2, help="of the meshes that are made")
     parser.add_argument("--with", dest="method", choices=OPTIMISERS.values(), help="print what this makes of a mesh")
     given = parser.parse_args()
     if given.method:
@@ -114,7 +116,7 @@ def main() -> None:
     table = Table("mesh", "elements", "as it is", "meshfix", "best", *OPTIMISERS, "left")
     begin()
     with tempfile.TemporaryDirectory() as folder:
-        for name, path in cases(given.meshes, Path(folder)):
+        for name, path in cases(given.meshes, Path(folder), given.order):
             document = read(path)
             if document.mesh.quadratic is None:
                 continue

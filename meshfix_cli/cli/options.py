@@ -380,7 +380,7 @@ solving = packed(
         type=click.Choice(CURVINGS),
         default="hold",
         show_default=True,
-        help="Elements of second order: whether curved edges of the boundary become straighter, by as little as is "
+        help="Curved elements: whether curved edges of the boundary become straighter, by as little as is "
         "found to do, where elements cannot be valid otherwise.",
     ),
 )

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from meshfix_cli.kernels._quadratic import QUADRATIC_SHAPES as QUADRATIC_SHAPES
 from meshfix_cli.kernels._quadratic import QuadraticEnergy as QuadraticEnergy
 from meshfix_cli.kernels._quadratic import QuadraticMesh as QuadraticMesh
-from meshfix_cli.kernels._quadratic import quadratic_coefficients as quadratic_coefficients
-from meshfix_cli.kernels._quadratic import quadratic_columns as quadratic_columns
+from meshfix_cli.kernels._quadratic import QuadraticType as QuadraticType
 from meshfix_cli.kernels._surface import area_vectors as area_vectors
 from meshfix_cli.kernels._surface import relocate_on_surface as relocate_on_surface
 from meshfix_cli.kernels._surface import unfold as unfold

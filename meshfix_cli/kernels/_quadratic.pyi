@@ -1,4 +1,6 @@
-"""Types of what the kernels know of elements of second order."""
+"""Types of what the kernels know of curved elements."""
+
+from collections.abc import Sequence
 
 from meshfix_cli.kernels import Float64, Int32, Uint8
 
@@ -6,17 +8,27 @@ from meshfix_cli.kernels import Float64, Int32, Uint8
 # element, and the weight of scaled Jacobians.
 QUADRATIC_SHAPES: list[tuple[int, list[list[int]], float]]
 
-def quadratic_coefficients(nodes: Float64, code: int) -> Float64:
-    """Bezier coefficients of det J of an element of second order (nodes, d)."""
+class QuadraticType:
+    """A type of more than second order."""
 
-def quadratic_columns(nodes: Float64, code: int, shares: Float64) -> Float64:
-    """Gradients (k, d) of these by x, where each node moves by its share of x; they are affine in it."""
+    def __init__(self, factors: Sequence[int], order: int, places: Float64, weight: float) -> None:
+        """Take the simplices whose product it is, and the barycentric coordinates (nodes, c) of its nodes in these.
+
+        The corners are the first of them; `weight` is that of scaled Jacobians. ValueError: there is no room for it.
+        """
 
 class QuadraticMesh:
-    """Elements of second order; see quadratic/mesh.hpp."""
+    """Elements of second and higher order; see quadratic/mesh.hpp."""
 
-    def __init__(self, codes: Uint8, nodes: Int32, n: int) -> None:
-        """Take the types (m,), the nodes, one element behind the other, and the number of points."""
+    def __init__(self, codes: Uint8, nodes: Int32, n: int, types: Sequence[QuadraticType] = ()) -> None:
+        """Take the types (m,), the nodes, one element behind the other, and the number of points.
+
+        Types that are not of second order are numbered behind these.
+        """
+    def coefficients(self, points: Float64) -> Float64:
+        """Bezier coefficients of det J of the first element."""
+    def columns(self, points: Float64, shares: Float64) -> Float64:
+        """Gradients (k, d) of these by x, where each node moves by its share of x; they are affine in it."""
     def judge(self, points: Float64, threads: int) -> tuple[Uint8, Float64, Float64, Float64]:
         """Verdicts, smallest relative coefficients, measures and scaled Jacobians, each (m,)."""
     def sizes(self, points: Float64, threads: int) -> Float64:

@@ -1,6 +1,6 @@
 """The one table of element types: what they are called, what their facets are, and which of them are solved for.
 
-A type that is known and not judged is held where it stands beside elements that are; one of second order is judged as
+A type that is known and not judged is held where it stands beside elements that are; one of higher order is judged as
 the linear one of its corners where its other nodes lie between these. Corner nodes have the order of gmsh, which is
 that of VTK's parametric coordinates, and other nodes that of VTK. Light to import.
 
@@ -15,7 +15,7 @@ import re
 from dataclasses import dataclass
 from functools import cache, cached_property
 
-from meshfix_cli.mesh.lagrange import Kind, kinds
+from meshfix_cli.mesh.lagrange import Kind, kinds, lobatto_kinds
 
 Rows = tuple[tuple[int, ...], ...]
 Weights = tuple[tuple[float, ...], ...]
@@ -273,7 +273,7 @@ def element_of(key: str) -> Element | None:
 
 @cache
 def _of_any_order(key: str) -> Element | None:
-    kind = kinds().get(key)
+    kind = kinds().get(key) or lobatto_kinds().get(key)
     return None if kind is None else Element(key, ELEMENTS[kind.family].shape, len(kind.places()), lattice=kind)
 
 
@@ -298,7 +298,9 @@ def words(key: str) -> tuple[str, str]:
     element = element_of(key)
     if element is None:
         return f"{key} element", f"{key} elements"
-    order = "" if element.linear or not element.shape.corners else f" of {element.nodes} nodes"
+    lobatto = element.lattice is not None and element.lattice.lobatto
+    nodes = f"{element.nodes} {'Gauss-Lobatto ' * lobatto}nodes"
+    order = "" if element.linear or not element.shape.corners else f" of {nodes}"
     return f"{element.shape.name}{order}", f"{element.shape.plural}{order}"
 
 

@@ -112,11 +112,15 @@ def lattice(family: str, order: int, by: str = "gmsh", complete: bool = True) ->
 
 
 class Kind(NamedTuple):
-    """A type of elements: its family, its order, and whether it has nodes also elsewhere than on edges."""
+    """A type of elements: its family, its order, and whether it has nodes also elsewhere than on edges.
+
+    Nodes are evenly spaced along edges, or stand closer together at the ends, at the points of Gauss and Lobatto.
+    """
 
     family: str
     order: int
     complete: bool
+    lobatto: bool = False
 
     def places(self, by: str = "vtk") -> tuple[Place, ...]:
         """Where its nodes lie, see `lattice`."""
@@ -125,7 +129,32 @@ class Kind(NamedTuple):
     @property
     def weights(self) -> tuple[tuple[float, ...], ...]:
         """(nodes, corners): the values of the shape functions of the linear element at its nodes, in VTK's order."""
+        if self.lobatto:
+            corners = lattice(self.family, 1, "vtk")
+            at = [
+                [coordinate for one in _barycentric(self.family, place, 1) for coordinate in one] for place in corners
+            ]
+            return tuple(
+                tuple(math.prod(x for x, one in zip(node, corner, strict=True) if one) for corner in at)
+                for node in self.barycentric
+            )
         return tuple(tuple(_linear(self.family, place, self.order)) for place in self.places())
+
+    @property
+    def factors(self) -> tuple[int, ...]:
+        """The dimensions of the simplices whose product it is; there is none for pyramids."""
+        return _FACTORS[self.family]
+
+    @property
+    def barycentric(self) -> tuple[tuple[float, ...], ...]:
+        """(nodes, c): the coordinates of its nodes in all of these, one behind the other, in VTK's order."""
+        along = _lobatto(self.order) if self.lobatto else tuple(range(self.order + 1))
+        found = []
+        for place in self.places():
+            parts = [[along[step] for step in steps] for steps in _barycentric(self.family, place, self.order)]
+            # Whatever their order, the sum has the same bits: mirrored nodes have the same coordinates.
+            found.append(tuple(x / math.fsum(part) for part in parts for x in part))
+        return tuple(found)
 
     def order_of(self, by: str) -> list[int]:
         """Return which of the nodes in another order stands in each place of VTK's."""
@@ -150,6 +179,52 @@ def kinds() -> dict[str, Kind]:
             if edges and found.setdefault(name, kind).order != order:
                 found[f"{name}i"] = kind
     return found
+
+
+@cache
+def lobatto_kinds() -> dict[str, Kind]:
+    """Return those of points of Gauss and Lobatto by their names, which end in an l; of second order there are none."""
+    return {f"{key}l": kind._replace(lobatto=True) for key, kind in kinds().items() if kind.complete and kind.order > 2}
+
+
+@cache
+def key_of(kind: Kind) -> str:
+    """Return the name of a type of second or higher order."""
+    return next(key for key, one in (kinds() | lobatto_kinds()).items() if one == kind)
+
+
+_FACTORS = {"line": (1,), "triangle": (2,), "quad": (1, 1), "tetra": (3,), "wedge": (2, 1), "hexahedron": (1, 1, 1)}
+
+
+def _barycentric(family: str, place: Place, order: int) -> list[tuple[int, ...]]:
+    """Return the coordinates of a place in each of the simplices whose product its family is, in steps."""
+    found, at = [], 0
+    for n in _FACTORS[family]:
+        here = place[at : at + n]
+        found.append((order - sum(here), *here))
+        at += n
+    return found
+
+
+@cache
+def _lobatto(order: int) -> tuple[float, ...]:
+    """Return the points of Gauss and Lobatto from 0 to 1: the ends, and where the derivative of Legendre's is zero."""
+    if order < 2:
+        return (0.0, 1.0)[: order + 1]
+    half = []
+    for k in range(1, (order + 1) // 2):
+        x = math.cos(math.pi * k / order)
+        for _ in range(_NEWTON):
+            last, legendre = 1.0, x
+            for n in range(1, order):
+                last, legendre = legendre, ((2 * n + 1) * x * legendre - n * last) / (n + 1)
+            first = order * (last - x * legendre) / (1 - x * x)
+            x -= first * (1 - x * x) / (2 * x * first - order * (order + 1) * legendre)
+        half.append((1 - x) / 2)
+    return (0.0, *half, *((0.5,) if order % 2 == 0 else ()), *(1 - x for x in reversed(half)), 1.0)
+
+
+_NEWTON = 8  # steps, of which each doubles the digits
 
 
 def _size(family: str, order: int) -> int:

@@ -46,7 +46,7 @@ class Mesh:
     freedom : Freedom or None
         Where those of the movable vertices may go that are on the boundary; None: there are none.
     quadratic : Quadratic or None
-        The elements of second order that are curved; None: each element is the straight one of its corners.
+        The elements of higher order of which some are curved; None: each element is the straight one of its corners.
     surface : Surface or None
         What tells the sides of a surface in space, of which the points are (n, 3) and the elements of dimension 2.
     """

@@ -1,29 +1,50 @@
-"""Elements of second order: which nodes they have, and the passes over all of them that tell which are valid."""
+"""Curved elements: which nodes they have, and the passes over all of them that tell which are valid."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, Element, element_of
 from meshfix_cli.mesh.ties import Ties, ties_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 BENT = 1e-6  # of an element's size, by which its nodes may lie off and it is straight
+MOST_NODES = 128  # that the kernels have room for: quadrilaterals of tenth order, hexahedra of fourth
 
-# The types that are judged by the Bezier coefficients of their nodes, in the order of the kernels' numbers for them.
+# The types of second order that are judged by the Bezier coefficients of their nodes, in the order of the kernels'
+# numbers for them. Those of higher order have numbers behind them, which each mesh gives anew.
 SECOND_ORDER = tuple(
     ELEMENTS[key]
     for key in ("triangle6", "quad8", "quad9", "tetra10", "wedge15", "wedge18", "hexahedron20", "hexahedron27")
 )
+
+
+def is_judged(element: Element) -> bool:
+    """Whether elements of a type are judged where they are curved."""
+    kind = element.lattice
+    if kind is None:
+        return element in SECOND_ORDER
+    return kind.complete and kind.family in _FAMILIES and element.nodes <= MOST_NODES
+
+
+_FAMILIES = frozenset({"triangle", "quad", "tetra", "wedge", "hexahedron"})
+
+
+@cache
+def _type_of(element: Element) -> kernels.QuadraticType:
+    """Return what the kernels know of a type of more than second order."""
+    kind = element.lattice
+    assert kind is not None
+    return kernels.QuadraticType(kind.factors, kind.order, np.array(kind.barycentric), element.shape.weight)
 
 
 class Judgement(NamedTuple):
@@ -47,8 +68,14 @@ class Judgement(NamedTuple):
     scaled_jacobians: Array
 
 
+def _known(key: str) -> Element:
+    element = element_of(key)
+    assert element is not None
+    return element
+
+
 class Quadratic:
-    """Elements of second order of a mesh, of which some are curved.
+    """Elements of second or higher order of a mesh, of which some are curved.
 
     Attributes
     ----------
@@ -58,8 +85,10 @@ class Quadratic:
         The nodes between corners that may move.
     giving : (n,) bool
         Those that are held for no other reason than that they are on the boundary.
+    types : tuple of Element
+        `SECOND_ORDER`, and others that there are.
     codes : (m,) uint8
-        Their types, positions in `SECOND_ORDER`.
+        Their types, positions in these.
     offsets : (m+1,) int64
         Where the nodes of each begin in `nodes`.
     nodes : int32
@@ -82,16 +111,19 @@ class Quadratic:
 
         `ties`, of these and maybe of others, are found where they are not given.
         """
-        code = {element.key: i for i, element in enumerate(SECOND_ORDER)}
+        elements = [_known(key) for key, _ in blocks]
+        others = dict.fromkeys(element for element in elements if element not in SECOND_ORDER)
+        self.types = (*SECOND_ORDER, *others)
+        code = {element.key: i for i, element in enumerate(self.types)}
         self.codes = np.concatenate([np.full(len(nodes), code[key], dtype=np.uint8) for key, nodes in blocks])
         self.nodes = np.concatenate([nodes.ravel() for _, nodes in blocks]).astype(np.int32)
-        self.offsets = np.concatenate([[0], np.cumsum(np.array([one.nodes for one in SECOND_ORDER])[self.codes])])
+        self.offsets = np.concatenate([[0], np.cumsum(np.array([one.nodes for one in self.types])[self.codes])])
         self.n = n
         self.rows = np.arange(len(self.codes)) if rows is None else rows
-        self.ties = ties or ties_of([(ELEMENTS[key], nodes) for key, nodes in blocks], n)[0]
+        self.ties = ties or ties_of(list(zip(elements, (nodes for _, nodes in blocks), strict=True)), n)[0]
         self.free = self.used & ~self.corners
         self.giving = np.zeros(n, dtype=bool)
-        self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n)
+        self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n, [_type_of(element) for element in others])
 
     def holding(self, held: Mask, giving: Mask) -> Quadratic:
         """Return the same elements with nodes held, both (n,) bool; see `giving`."""

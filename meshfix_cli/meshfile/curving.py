@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, listed
 from meshfix_cli.mesh.elements import ELEMENTS, counted, words
-from meshfix_cli.mesh.quadratic import SECOND_ORDER, Quadratic
+from meshfix_cli.mesh.quadratic import Quadratic, is_judged
 from meshfix_cli.meshfile.solved import Part
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.ties import Ties
 
 Mask = NDArray[np.bool_]
+SAME = 1e-7  # by which shares of corners may differ, and nodes lie at the same place
 OFF_PLANE = 1e-6  # of the size of a plane mesh, by which its nodes may lie off
 
 
@@ -30,7 +31,7 @@ def quadratic_of(
     held: Mask,
     on_cells: Mask,
 ) -> Quadratic:
-    """Return the elements of second order of a mesh of which some are curved.
+    """Return the elements of second or higher order of a mesh of which some are curved.
 
     Nodes on facets of the boundary and between regions stay, and so do those that are held.
 
@@ -53,9 +54,9 @@ def quadratic_of(
     """
     _check(parts, curved)
     blocks, rows, start = [], [], 0
-    other = held | _alike(ties)
+    other, highest = held | _alike(ties), max(map(_order_of, parts))
     for part in parts:
-        other[_lacking(part, ties)] = True
+        other[_lacking(part, ties, highest)] = True
         here = np.arange(start, start + len(part.vertices))
         start += len(part.vertices)
         if not _is_judged(part):
@@ -100,25 +101,38 @@ def check_plane(
 
 
 def _alike(ties: Ties) -> Mask:
-    """Mark the nodes (n,) that lie between the same corners as others: two sides of a seam, which must not part."""
+    """Mark the nodes (n,) that have one place between the same corners: two sides of a seam, which must not part."""
     mask = np.zeros(ties.n, dtype=bool)
     for tie in ties.groups:
-        number, counts = np.unique(tie.corners, axis=0, return_inverse=True, return_counts=True)[1:]
+        places = np.hstack([tie.corners, np.rint(tie.weights / SAME).astype(np.int64)])
+        number, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)[1:]
         mask[tie.nodes[counts[number.reshape(-1)] > 1]] = True
     return mask
 
 
-def _lacking(part: Part, ties: Ties) -> NDArray[np.integer]:
-    """Return nodes (k,) on edges and faces of elements that do not have them: there they must stay in the middle."""
+def _order_of(part: Part) -> int:
+    """Return the order of elements that have nodes between corners; 1: they have none."""
+    if part.refined is None:
+        return 1
+    return 2 if part.refined.lattice is None else part.refined.lattice.order
+
+
+def _lacking(part: Part, ties: Ties, highest: int) -> NDArray[np.integer]:
+    """Return nodes (k,) on edges and faces of elements that do not have them: there they must stay in the middle.
+
+    Beside elements of a higher order none of those that elements have on their sides are the same.
+    """
     shape = ELEMENTS[part.key].shape
-    own = [] if part.refined is None else [set(np.flatnonzero(weights)) for weights in part.refined.weights]
-    sides = [*(ends for edges in shape.parallel for ends in edges), *(one for one in shape.facets if len(one) == 4)]
+    lower = part.refined is None or _order_of(part) < highest
+    own = [] if lower or part.refined is None else [set(np.flatnonzero(weights)) for weights in part.refined.weights]
+    faces = [one for one in shape.facets if len(one) == 4 or (len(one) == 3 and highest > 2)]
+    sides = [*(ends for edges in shape.parallel for ends in edges), *faces]
     found = [_found(ties, part.vertices[:, list(side)]) for side in sides if set(side) not in own]
     return np.concatenate([np.empty(0, dtype=np.int32), *found])
 
 
 def _is_judged(part: Part) -> bool:
-    return part.refined is not None and part.refined in SECOND_ORDER and part.type == part.refined.key
+    return part.refined is not None and is_judged(part.refined) and part.type == part.refined.key
 
 
 def _check(parts: Sequence[Part], curved: Mask) -> None:

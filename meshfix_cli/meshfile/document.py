@@ -141,13 +141,14 @@ class Document:
                 points[moved] = original[moved] + (mesh.points[moved] - self.mesh.points[moved]) @ self.basis
         if not self.source.exact:
             points[moved] = self.source.rounded(points[moved])
-        if self.copies is not None:
-            behind = np.flatnonzero(moved[self.copies] & ~mesh.topology.used)
-            points[behind] = points[self.copies[behind]]
         if self.ties is not None and mesh.quadratic is None:
             followed = self.ties.follow(points, moved)
             if not self.source.exact:
                 points[followed] = self.source.rounded(points[followed])
+            moved = moved | followed
+        if self.copies is not None:
+            behind = np.flatnonzero(moved[self.copies] & ~mesh.topology.used)
+            points[behind] = points[self.copies[behind]]
         return points
 
     def as_stored(self, mesh: Mesh) -> Mesh:
@@ -392,7 +393,7 @@ def _corners_of(solved: Solved, which: NDArray[np.bool_], n: int) -> NDArray[np.
 
 def _copies(points: NDArray[np.float64], solved: Solved) -> NDArray[np.int64]:
     """Return for each point the first at its place that an element has; itself for what `Mesh.build` will refuse."""
-    used = np.unique(solved.vertices())
+    used = np.unique(solved.nodes())
     return first_of_each_place(points, used[(used >= 0) & (used < len(points))])
 
 

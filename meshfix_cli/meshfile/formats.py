@@ -179,7 +179,8 @@ OWN = {
     ),
     "mfem": Own(
         "mfem", recognise.mfem, {".mesh": "mfem"}, "MFEM",
-        "versions 1.0, 1.2 and 1.3, also with nodes of first or second order; no NURBS or nonconforming meshes",
+        "versions 1.0, 1.2 and 1.3, also with nodes of any order up to ten, shared or of each element; no NURBS or "
+        "nonconforming meshes",
         "attributes; their sets, and those of the boundary",
     ),
     "mdpa": Own(

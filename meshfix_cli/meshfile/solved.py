@@ -136,6 +136,10 @@ class Solved:
         """Return the vertices of all elements, one behind the other."""
         return _joined([part.vertices.ravel() for part in self.parts])
 
+    def nodes(self) -> Int64:
+        """Return the same with the nodes that elements have between these."""
+        return _joined([(part.vertices if part.nodes is None else part.nodes).ravel() for part in self.parts])
+
     def ties(self, points: NDArray[np.floating[Any]]) -> tuple[Ties | None, NDArray[np.bool_]]:
         """Find the nodes that follow corners, None: there are none, and mark the curved elements (m,).
 

@@ -47,7 +47,7 @@ class Jacobians:
 
 @dataclass(frozen=True)
 class Curved:
-    """Elements of second order, where some are curved.
+    """Elements of second or higher order, where some are curved.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Curved elements as they are drawn: with their edges in pieces, as the nodes in the middle of these bend them."""
+"""Curved elements as they are drawn: with their edges in pieces, as the nodes on these bend them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, Element, Shape
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.mesh.quadratic import SECOND_ORDER, Quadratic
+from meshfix_cli.mesh.quadratic import Quadratic
 
 Points = NDArray[np.float64]
 Rows = NDArray[np.int32]
@@ -21,7 +21,8 @@ Cells = Mapping[str, Rows]
 
 PIECES = ((2_000, 8), (10_000, 6))  # up to so many edges there are so many pieces of each, and of more:
 FEWEST = 4
-SEEN = 1e-3  # of the length of an edge: what its middle is off at least, where it is drawn in pieces
+SEEN = 1e-3  # of the length of an edge: what its nodes are off at least, where it is drawn in pieces
+PLACES = 9  # digits by which places of nodes along edges are the same
 MOST = 20_000  # elements of a type, or facets, that are drawn so; of more the straight ones of their corners
 BY, FILLED = (
     ":",
@@ -65,7 +66,7 @@ def surface(key: str) -> Surface:
     if not count:
         return Surface(shape.corners, sides, None, around)
     places, edges, more = {}, [], shape.corners
-    for a, b in _edges(name):
+    for a, b in _edges(shape):
         edges.append((a, *range(more, more + pieces - 1), b))
         places[a, b], places[b, a] = edges[-1][:-1], edges[-1][:0:-1]
         more += pieces - 1
@@ -78,12 +79,39 @@ def _around(side: Sequence[int]) -> list[tuple[int, int]]:
     return list(zip(side, (*side[1:], side[0]), strict=True))
 
 
-def _edges(key: str) -> list[tuple[int, int]]:
-    """Return the edges of a type, each once, in the direction in which its first side has it."""
-    shape, found = ELEMENTS[key].shape, []
+def _edges(shape: Shape) -> list[tuple[int, int]]:
+    """Return the edges of a shape, each once, in the direction in which its first side has it."""
+    found: list[tuple[int, int]] = []
     for side in shape.facets if shape.dimension == 3 else [range(shape.corners)]:
         found += [pair for pair in _around(tuple(side)) if pair[::-1] not in found and pair not in found]
     return found if shape.corners > 2 else [(0, 1)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """Edges whose nodes have the same places.
+
+    Attributes
+    ----------
+    ends : (e, 2) int
+    nodes : (e, k) int
+        From the first end on.
+    places : tuple of k float
+        Of these along the edge, from 0 to 1.
+    """
+
+    ends: NDArray[np.integer]
+    nodes: NDArray[np.integer]
+    places: tuple[float, ...]
+
+    def at(self, points: Points, t: Sequence[float]) -> Points:
+        """Return where they are (e, len(t), d) at parameters from 0 to 1, by the polynomial through all nodes."""
+        places = np.array([0.0, 1.0, *self.places])
+        basis = np.ones((len(t), len(places)))
+        for i, here in enumerate(places):
+            for other in np.delete(places, i):
+                basis[:, i] *= (np.array(t) - other) / (here - other)
+        return np.asarray(basis @ points[np.column_stack([self.ends, self.nodes])])
 
 
 class Curves:
@@ -105,17 +133,13 @@ class Curves:
         if quadratic is None:
             return
         bent = np.logical_or.reduce([_bent(mesh) for mesh in meshes])
-        curved = quadratic.with_one(bent)
-        near = quadratic.of(curved)
-        edges = [tie.at(near[tie.nodes]) for tie in quadratic.ties.groups if tie.corners.shape[1] == 2]
         if not bent.any():
             return
-        number = self._topology.number
-        self._middles = np.concatenate([tie.nodes for tie in edges])
-        ends = np.concatenate([tie.corners for tie in edges])
-        self._ends = np.take_along_axis(ends, np.argsort(number[ends], axis=1), axis=1)
-        self._bent = bent[self._middles]
-        self._table = {2: number[self._ends]}
+        curved, number = quadratic.with_one(bent), self._topology.number
+        self._along = _edges_of(quadratic, curved, number)
+        self._bent = np.concatenate([bent[edges.nodes].any(axis=1) for edges in self._along])
+        ends = np.concatenate([edges.ends for edges in self._along])
+        self._table = {2: number[ends]}
         self.pieces = next((pieces for most, pieces in PIECES if len(ends) <= most), FEWEST)
         self._sides = _sides(quadratic, curved)
         self._table |= {width: np.sort(number[corners], axis=1) for width, corners in self._sides.items()}
@@ -127,13 +151,13 @@ class Curves:
         points = mesh.along_curve(mesh.points)
         if not self.pieces:
             return points
-        t = (np.arange(1, self.pieces) / self.pieces)[:, None]
-        start, end = (mesh.points[self._ends[:, k], None] for k in (0, 1))
-        middle = mesh.points[self._middles, None]
-        pieces = (1 - t) * (1 - 2 * t) * start + 4 * t * (1 - t) * middle + t * (2 * t - 1) * end
-        return np.concatenate(
-            [points, pieces.reshape(-1, points.shape[1]), self._centres(mesh, 3), self._centres(mesh, 4)]
-        )
+        pieces = self._at(mesh, [i / self.pieces for i in range(1, self.pieces)])
+        middles = self._at(mesh, [0.5])
+        return np.concatenate([points, pieces, *(self._centres(mesh, middles, width) for width in (3, 4))])
+
+    def _at(self, mesh: Mesh, t: Sequence[float]) -> Points:
+        """Return all edges at parameters, one edge behind the other."""
+        return np.concatenate([edges.at(mesh.points, t).reshape(-1, mesh.points.shape[1]) for edges in self._along])
 
     def refined(self, cells: Cells, shared: bool = False) -> dict[str, Rows]:
         """Return cells with those that are curved as other types, see `surface`.
@@ -165,7 +189,8 @@ class Curves:
 
     def _numbers(self, key: str, rows: Rows) -> tuple[NDArray[np.bool_], Rows]:
         """Mark the rows (r,) that are curved, and give the numbers of all points of these; of a line in its order."""
-        edges, shape = _edges(key), ELEMENTS[key].shape
+        shape = ELEMENTS[key].shape
+        edges = _edges(shape)
         sides = [] if key == "line" else shape.facets if shape.dimension == 3 else [tuple(range(shape.corners))]
         at = np.stack([self._find(rows[:, pair]) for pair in edges], axis=1)
         inside = [self._find(rows[:, side]) for side in sides]
@@ -186,7 +211,7 @@ class Curves:
     def _first(self, width: int) -> int:
         """Return the number of the first point of edges or sides of so many corners."""
         start = len(self._topology.connectivity.vertices)
-        return start + (width > 2) * len(self._ends) * (self.pieces - 1) + (width > 3) * len(self._sides[3])
+        return start + (width > 2) * len(self._bent) * (self.pieces - 1) + (width > 3) * len(self._sides[3])
 
     def _find(self, corners: NDArray[np.integer]) -> NDArray[np.int64]:
         """Return the positions (r,) of edges or sides (r, w), -1 for others."""
@@ -197,33 +222,63 @@ class Curves:
         pairs = np.stack([sides, np.roll(sides, -1, axis=1)], axis=2)
         return self._find(pairs.reshape(-1, 2)).reshape(sides.shape)
 
-    def _centres(self, mesh: Mesh, width: int) -> Points:
+    def _centres(self, mesh: Mesh, middles: Points, width: int) -> Points:
         """Return the middles of sides of so many corners: where these have no node, it is where their edges have it."""
         corners = mesh.points[self._sides[width]].sum(axis=1)
-        middles = mesh.points[self._middles[self._edges_of[width]]].sum(axis=1)
+        around = middles[self._edges_of[width]].sum(axis=1)
         if width == 3:
-            return (4 * middles - corners) / 9
+            return (4 * around - corners) / 9
         nodes = self._nodes[width]
-        return np.where((nodes >= 0)[:, None], mesh.points[nodes], (2 * middles - corners) / 4)
+        return np.where((nodes >= 0)[:, None], mesh.points[nodes], (2 * around - corners) / 4)
 
 
 def _bent(mesh: Mesh) -> NDArray[np.bool_]:
-    """Mark the nodes (n,) on edges that are seen to be off the middle of these."""
+    """Mark the nodes (n,) on edges that are seen to be off the place where a straight edge has them."""
     quadratic, points = mesh.quadratic, mesh.points
     assert quadratic is not None
     mask = np.zeros(quadratic.n, dtype=bool)
     for tie in (tie.at(quadratic.used[tie.nodes]) for tie in quadratic.ties.groups if tie.corners.shape[1] == 2):
         start, end = (points[tie.corners[:, k]] for k in (0, 1))
-        off = np.linalg.norm(points[tie.nodes] - (start + end) / 2, axis=1)
+        off = np.linalg.norm(points[tie.nodes] - tie.middle(points), axis=1)
         mask[tie.nodes] = off > SEEN * np.linalg.norm(end - start, axis=1)
     return mask
+
+
+def _edges_of(quadratic: Quadratic, elements: NDArray[np.bool_], number: NDArray[np.integer]) -> list[_Edges]:
+    """Return the edges of some elements (m,), each once, from the end with the smaller number on."""
+    found: dict[tuple[float, ...], list[NDArray[np.integer]]] = {}
+    exact: dict[tuple[float, ...], tuple[float, ...]] = {}
+    for code in np.unique(quadratic.codes[elements]):
+        element = quadratic.types[code]
+        starts = quadratic.offsets[:-1][elements & (quadratic.codes == code)]
+        for nodes, places in _nodes_on_edges(element):
+            rows = quadratic.nodes[starts[:, None] + np.array(nodes)]
+            descending = number[rows[:, 0]] > number[rows[:, -1]]
+            rows[descending] = rows[descending, ::-1]
+            key = tuple(round(place, PLACES) for place in places)
+            exact.setdefault(key, places)
+            found.setdefault(key, []).append(rows)
+    several = {key: np.unique(np.concatenate(rows), axis=0) for key, rows in found.items()}
+    return [_Edges(rows[:, [0, -1]], rows[:, 1:-1], exact[key]) for key, rows in several.items()]
+
+
+@cache
+def _nodes_on_edges(element: Element) -> list[tuple[list[int], tuple[float, ...]]]:
+    """Return the nodes of a type on each edge, from end to end, and their places between these."""
+    found = []
+    for a, b in _edges(element.shape):
+        there = {place: weights[b] for place, weights in enumerate(element.weights, element.shape.corners)
+                 if set(np.flatnonzero(weights)) == {a, b}}  # fmt: skip
+        nodes = sorted(there, key=lambda place: there[place])
+        found.append(([a, *nodes, b], tuple(there[place] for place in nodes)))
+    return found
 
 
 def _sides(quadratic: Quadratic, elements: NDArray[np.bool_]) -> dict[int, NDArray[np.int32]]:
     """Return the sides of some elements (m,), each once, with three and with four corners (s, w), as they go round."""
     found: dict[int, list[NDArray[np.int32]]] = {3: [np.empty((0, 3), np.int32)], 4: [np.empty((0, 4), np.int32)]}
     for code in np.unique(quadratic.codes[elements]):
-        shape = SECOND_ORDER[code].shape
+        shape = quadratic.types[code].shape
         starts = quadratic.offsets[:-1][elements & (quadratic.codes == code)]
         corners = quadratic.nodes[starts[:, None] + np.arange(shape.corners)]
         for side in shape.facets if shape.dimension == 3 else [tuple(range(shape.corners))]:
@@ -235,12 +290,13 @@ def _sides(quadratic: Quadratic, elements: NDArray[np.bool_]) -> dict[int, NDArr
 
 
 def _nodes_between(quadratic: Quadratic, corners: NDArray[np.int32]) -> NDArray[np.int64]:
-    """Return the node (s,) that lies between the corners (s, w) of each side, or -1."""
+    """Return the node (s,) that lies in the middle between the corners (s, w) of each side, or -1."""
     found = np.full(len(corners), -1)
     for tie in quadratic.ties.groups:
         if tie.corners.shape[1] == corners.shape[1]:
-            at = _positions(tie.corners, np.sort(corners, axis=1))
-            found[at >= 0] = tie.nodes[at[at >= 0]]
+            some = tie.at((tie.weights == tie.weights[:, :1]).all(axis=1))
+            at = _positions(some.corners, np.sort(corners, axis=1))
+            found[at >= 0] = some.nodes[at[at >= 0]]
     return found
 
 

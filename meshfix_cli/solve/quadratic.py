@@ -1,4 +1,4 @@
-"""Elements of second order: nodes move until no element is invalid, then the worst are raised.
+"""Curved elements: nodes move until no element is invalid, then the worst are raised.
 
 The linear programme runs on the Bezier coefficients of det J, first of the nodes on edges, faces and inside, then of
 corners, with which the nodes go that lie between them. What it leaves is solved by an energy of all coefficients of a

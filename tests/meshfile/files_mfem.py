@@ -59,30 +59,72 @@ EDGES = {
     "line": "01", "triangle": "01 12 20", "quad": "01 12 23 30", "tetra": "01 02 03 12 13 23",
     "hexahedron": "01 12 32 03 45 56 76 47 04 15 26 37", "wedge": "01 12 20 34 45 53 03 14 25",
 }  # fmt: skip
-SQUARES = {"quad": "0123", "hexahedron": "3210 0154 1265 2376 3047 4567", "wedge": "0143 1254 2035"}
+FACES = {
+    "tetra": "123 032 013 021", "hexahedron": "3210 0154 1265 2376 3047 4567", "wedge": "021 345 0143 1254 2035",
+}  # fmt: skip
+# Along an edge from 0 to 1.
+EVEN = {order: [i / order for i in range(order + 1)] for order in (2, 3, 4)}
+LOBATTO = {
+    3: [0, (1 - 0.2**0.5) / 2, (1 + 0.2**0.5) / 2, 1],
+    4: [0, (1 - (3 / 7) ** 0.5) / 2, 0.5, (1 + (3 / 7) ** 0.5) / 2, 1]
+}  # fmt: skip
 
 
-def of_second_order(
-    points: NDArray[np.float64], blocks: Sequence[tuple[str, NDArray[Any]]], order: int, collection: str
+def of_order(
+    points: NDArray[np.float64],
+    blocks: Sequence[tuple[str, NDArray[Any]]],
+    ordering: int,
+    collection: str,
+    along: Sequence[float],
 ) -> str:
-    """A mesh whose nodes of second order lie in the middle, counted one by one as MFEM counts them."""
+    """A mesh whose nodes lie in straight elements, counted one by one as MFEM counts them."""
     cells = [(key, row) for key, rows in blocks for row in rows.tolist()]
-    d, middles = points.shape[1], [*points]
+    d, found = points.shape[1], [*points]
     met: set[frozenset[int]] = set()
-    for some in (EDGES, SQUARES):
+    for some in (EDGES, FACES):
         for key, row in cells:
-            for word in some.get(key, "").split() if key != "quad" or some is EDGES else ():
+            for word in some.get(key, "").split():
                 corners = [row[int(one)] for one in word]
                 if frozenset(corners) not in met:
                     met.add(frozenset(corners))
-                    middles.append(points[corners].mean(axis=0))
-    middles += [points[row].mean(axis=0) for key, row in cells if key in ("quad", "hexahedron")]
+                    found += inside(points[sorted(corners) if some is EDGES else corners], along)
+    for key, row in cells:
+        found += inside(points[row], along, key)
     skin = facets(cells)
     listed = ["".join(f"1 {NUMBERS[key]} {' '.join(map(str, row))}\n" for key, row in some) for some in (cells, skin)]
     return (
         f"MFEM mesh v1.0\n{HEAD}dimension\n{d}\n\nelements\n{len(cells)}\n{listed[0]}\n"
-        f"boundary\n{len(skin)}\n{listed[1]}\nvertices\n{len(points)}\n{nodes(np.array(middles), order, collection)}"
+        f"boundary\n{len(skin)}\n{listed[1]}\nvertices\n{len(points)}\n{nodes(np.array(found), ordering, collection)}"
     )
+
+
+def inside(corners: NDArray[np.float64], along: Sequence[float], key: str = "") -> list[NDArray[np.float64]]:
+    """The nodes inside of an edge, a face or an element, as loops over its coordinates make them."""
+    g, p = along, len(along) - 1
+    steps = range(1, p)
+    key = key or ("line", "triangle", "quad")[len(corners) - 2]
+
+    def simplex(*steps: int) -> list[float]:
+        left = p - sum(steps)
+        shares = [g[left], *(g[i] for i in steps)]
+        return [share / sum(shares) for share in shares]
+
+    def quad(i: int, j: int) -> list[float]:
+        x, y = g[i], g[j]
+        return [(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y]
+
+    def up(base: list[float], k: int) -> list[float]:
+        return [(1 - g[k]) * share for share in base] + [g[k] * share for share in base]
+
+    weights = {
+        "line": lambda: [[1 - g[i], g[i]] for i in steps],
+        "triangle": lambda: [simplex(i, j) for j in steps for i in steps if i + j < p],
+        "quad": lambda: [quad(i, j) for j in steps for i in steps],
+        "tetra": lambda: [simplex(i, j, k) for k in steps for j in steps for i in steps if i + j + k < p],
+        "wedge": lambda: [up(simplex(i, j), k) for k in steps for j in steps for i in steps if i + j < p],
+        "hexahedron": lambda: [up(quad(i, j), k) for k in steps for j in steps for i in steps],
+    }[key]()
+    return [np.array(one) @ corners for one in weights]
 
 
 def facets(cells: Sequence[tuple[str, list[int]]]) -> list[tuple[str, list[int]]]:

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from bent import curved
 from elements import MESHES
 from files_medit import surface
-from files_mfem import CORNERS, FILES, NUMBERS, nodes, of_second_order, text
-from second_order import is_straight
+from files_mfem import CORNERS, EVEN, FILES, LOBATTO, NUMBERS, nodes, of_order, text
+from numpy.typing import NDArray
 from shapes import block, plate
 
 from meshfix_cli import read, untangle, write
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.elements import ELEMENTS
+from meshfix_cli.mesh.elements import ELEMENTS, element_of
+from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.mesh.lagrange import lattice
 from meshfix_cli.meshfile import formats
 from meshfix_cli.meshfile.mfem import parse
+from meshfix_cli.meshfile.mfem.nodes import own_nodes
 from meshfix_cli.meshfile.recognise import Format
 from meshfix_cli.meshfile.solved import turned
+from meshfix_cli.repair import Method
 
 SMALL = b"""MFEM mesh v1.3
 
@@ -125,33 +131,78 @@ def test_nodes_of_first_order_are_the_coordinates(order: int, collection: str) -
     np.testing.assert_array_equal(source.cells[0].vertices, cells)
 
 
+SPACES = [
+    (0, "H1_3D_P2", EVEN[2]), (1, "Quadratic", EVEN[2]), (1, "H1@U_2D_P2", EVEN[2]), (1, "H1_3D_P3", LOBATTO[3]),
+    (0, "H1@G_3D_P4", LOBATTO[4]), (0, "H1@U_3D_P3", EVEN[3]), (1, "H1@U_3D_P4", EVEN[4]),
+]  # fmt: skip
+
+
 @pytest.mark.parametrize("name", ["quads and triangles", "hexes and wedges", "wedges and tets"])
-@pytest.mark.parametrize(("order", "collection"), [(0, "H1_3D_P2"), (1, "Quadratic"), (1, "H1@U_2D_P2")])
-def test_nodes_of_second_order_are_those_of_the_elements(name: str, order: int, collection: str) -> None:
+@pytest.mark.parametrize(("ordering", "collection", "along"), SPACES)
+def test_nodes_of_higher_order_are_those_of_the_elements(
+    name: str, ordering: int, collection: str, along: list[float]
+) -> None:
     points, blocks = MESHES[name]()
-    source = parse(of_second_order(points, blocks, order, collection).encode())
+    source = parse(of_order(points, blocks, ordering, collection, along).encode())
     linear = {(key, tuple(row)) for key, rows in blocks for row in rows.tolist()}
     found = set()
     for run in source.cells:
-        assert is_straight(run.type, source.points[run.vertices], 2e-6)
+        element = element_of(run.type)
+        assert element is not None
+        corners = source.points[run.vertices[:, : element.shape.corners]]
+        middles = np.array(element.weights) @ corners
+        np.testing.assert_allclose(source.points[run.vertices[:, element.shape.corners :]], middles, atol=3e-6)
         if run.ids is not None:
-            key = run.type.rstrip("0123456789")
-            found |= {(key, tuple(row)) for row in run.vertices[:, : ELEMENTS[key].nodes].tolist()}
+            assert element.straight is not None
+            found |= {(element.straight.key, tuple(row)) for row in run.vertices[:, : corners.shape[1]].tolist()}
     assert found == linear
     assert len(np.unique(np.concatenate([run.vertices.ravel() for run in source.cells]))) == len(source.points)
 
 
+@pytest.mark.parametrize(("kind", "along"), [("T1", LOBATTO[4]), ("T4", EVEN[3])])
+def test_elements_have_nodes_of_higher_order_for_themselves(kind: str, along: list[float]) -> None:
+    order = len(along) - 1
+    for key in ("triangle", "quad", "tetra", "wedge", "hexahedron"):
+        straight = ELEMENTS[key]
+        corners = np.array(lattice(key, 1), dtype=float)
+        rows = own(key, corners, along)
+        d = corners.shape[1]
+        values = "\n".join(" ".join(map(repr, row)) for row in rows.tolist())
+        source = parse(
+            f"MFEM mesh v1.0\ndimension\n{d}\nelements\n1\n"
+            f"1 {NUMBERS[key]} {' '.join(map(str, range(straight.nodes)))}\nboundary\n0\n"
+            f"vertices\n{straight.nodes}\nnodes\nFiniteElementSpace\nFiniteElementCollection: "
+            f"L2_{kind}_{d}D_P{order}\nVDim: {d}\nOrdering: 1\n{values}\n".encode()
+        )
+        element = element_of(source.cells[0].type)
+        assert element is not None
+        found = source.points[source.cells[0].vertices[0]][:, :d]
+        np.testing.assert_allclose(found, np.concatenate([corners, np.array(element.weights) @ corners]), atol=1e-12)
+
+
+def own(key: str, corners: NDArray[np.float64], along: list[float]) -> NDArray[np.float64]:
+    """Return the nodes of an element, on its sides too, by loops: the first coordinate runs first."""
+    g, p, d = along, len(along) - 1, corners.shape[1]
+    found = []
+    for steps in product(range(p + 1), repeat=d):
+        place, simplex = steps[::-1], {"triangle": 2, "wedge": 2, "tetra": 3}.get(key, 0)
+        if sum(place[:simplex]) > p:
+            continue
+        shares = [g[p - sum(place[:simplex])], *(g[i] for i in place[:simplex])] if simplex else [1.0]
+        found.append([x / sum(shares) for x in shares[1:]] + [g[i] for i in place[simplex:]])
+    return np.array(found)
+
+
 def test_nodes_of_second_order_that_cannot_be_told() -> None:
-    square = of_second_order(
-        np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), [("quad", np.arange(4)[None])], 1, "Quadratic"
-    )
+    corners = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+    square = of_order(corners, [("quad", np.arange(4)[None])], 1, "Quadratic", EVEN[2])
     source = parse(square.encode())
     assert source.cells[0].vertices.tolist() == [[*range(9)]]
     with pytest.raises(ReadError, match="has nodes of order 2, which are told apart by the order of its elements"):
         source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([0])}))  # type: ignore[union-attr]
     with pytest.raises(ReadError, match="a facet on its boundary that is none of an element"):
         parse(square.replace("1 1 0 1\n", "1 1 0 2\n").encode())
-    pyramid = of_second_order(np.eye(5, 3), [("tetra", np.arange(4)[None])], 1, "Quadratic").replace(
+    pyramid = of_order(np.eye(5, 3), [("tetra", np.arange(4)[None])], 1, "Quadratic", EVEN[2]).replace(
         "1 4 0 1 2 3", "1 7 0 1 2 3 4"
     )
     with pytest.raises(ReadError, match="has pyramids with nodes of order 2"):
@@ -183,6 +234,39 @@ def test_elements_with_nodes_of_their_own_are_solved_as_one_mesh_where_points_ar
         )
 
 
+@pytest.mark.parametrize("straight", [False, True])
+def test_elements_with_nodes_of_higher_order_for_themselves_are_solved_as_one_mesh(
+    straight: bool, tmp_path: Path
+) -> None:
+    """Points that are joined stay together, and those on the boundary where they are."""
+    quadratic, points, free = curved("quad16", 0.0 if straight else 0.3)
+    if straight:
+        tangled = points.copy()
+        tangled[free & quadratic.corners] += np.random.default_rng(1).uniform(-0.4, 0.4, (4, 2))
+        points = quadratic.straight(tangled)
+    rows = quadratic.nodes.reshape(len(quadratic), -1)
+    order = np.argsort(own_nodes("quad", 3))
+    values = "\n".join(" ".join(map(repr, row)) for row in points[rows[:, order]].reshape(-1, 2).tolist())
+    elements = "\n".join(f"1 3 {' '.join(map(str, row[:4]))}" for row in rows.tolist())
+    (tmp_path / "in.mesh").write_text(
+        f"MFEM mesh v1.0\ndimension\n2\nelements\n{len(rows)}\n{elements}\nboundary\n0\nvertices\n"
+        f"{rows[:, :4].max() + 1}\nnodes\nFiniteElementSpace\nFiniteElementCollection: L2_T4_2D_P3\n"
+        f"VDim: 2\nOrdering: 1\n{values}\n"
+    )
+    document = read(tmp_path / "in.mesh", join_points=True)
+    assert (document.mesh.quadratic is None) == straight
+    assert document.mesh.check()[0] == (quadratic.judge(points, 1).verdicts != VALID).sum() > 0
+    outcome = Method().solve(document.mesh, float("inf"), 1)
+    write(document, outcome.after, tmp_path / "out.mesh")
+    again = read(tmp_path / "out.mesh", join_points=True)
+    assert again.mesh.check()[0] == 0
+    found = again.source.points.reshape(*rows.shape, -1)[:, own_nodes("quad", 3), :2]
+    for node in range(len(points)):
+        places = found[rows == node]
+        assert (places == places[0]).all()
+        assert free[node] or (places[0] == points[node]).all()
+
+
 def test_nodes_of_quadrilaterals_and_hexahedra_run_by_coordinates() -> None:
     for kind, d, order in (("3", 2, [0, 1, 3, 2]), ("5", 3, [0, 1, 3, 2, 4, 5, 7, 6])):
         corners = [[i & 1, i >> 1 & 1, i >> 2][:d] for i in range(2**d)]
@@ -211,13 +295,15 @@ def test_the_boundary_of_elements_with_nodes_of_their_own_is_held() -> None:
         (b"MFEM INLINE mesh v1.0\n\ntype = quad\nnx = 4\n", r"is a mesh that is to be made \(INLINE\) of MFEM"),
         (SMALL.replace(b"v1.3", b"v1.4"), "is of MFEM's version 1.4"),
         (SMALL + b"\nvertex_parents\n0\n", r"is a nonconforming mesh \(NC\)"),
-        (text(*block(), nodes(block()[0], 1, "H1_3D_P3")).encode(), r"has curved elements \(nodes of order 3\)"),
+        (text(*block(), nodes(block()[0], 1, "H1_3D_P3")).encode(), "is truncated"),
+        (text(*block(), nodes(block()[0], 1, "H1_3D_P11")).encode(), "has nodes of order 11"),
+        (text(*block(), nodes(block()[0], 1, "Cubic")).encode(), "has nodes in the space Cubic"),
         (
             text(*block(), nodes(block()[0], 1, "Quadratic")).encode(),
             "numbers are announced, and the file is truncated",
         ),
         (text(*block(), nodes(block()[0], 1, "H1Pos_3D_P2")).encode(), "has nodes in the space H1Pos_3D_P2"),
-        (text(*block(), nodes(block()[0], 1, "L2_T4_3D_P4")).encode(), r"has curved elements \(nodes of order 4\)"),
+        (text(*block(), nodes(block()[0], 1, "L2_T2_3D_P4")).encode(), "has nodes in the space L2_T2_3D_P4"),
         (text(*block(), nodes(block()[0], 1, "L2_3D_P1")).encode(), "has nodes in the space L2_3D_P1"),
         (text(*block(), nodes(block()[0][:-1], 1, "H1_3D_P1")).encode(), "is truncated"),
     ],

@@ -1,4 +1,4 @@
-"""Grids of elements of second order, straight ones and such whose inner nodes are moved."""
+"""Grids of elements of second and higher order, straight ones and such whose inner nodes are moved."""
 
 from __future__ import annotations
 
@@ -19,10 +19,15 @@ FAMILIES = {
     "tetra10": ("tetra", SERENDIPITY), "wedge15": ("wedge", SERENDIPITY), "wedge18": ("wedge", COMPLETE),
     "hexahedron20": ("hexahedron", SERENDIPITY), "hexahedron27": ("hexahedron", COMPLETE),
 }  # fmt: skip
+HIGHER = {
+    "triangle10": "triangle", "triangle15": "triangle", "quad16": "quad", "tetra20": "tetra", "wedge40": "wedge",
+    "hexahedron64": "hexahedron",
+}  # fmt: skip
+FAMILIES |= {key: (kind, {kind: key}) for key, kind in HIGHER.items()}
 
 
 def straight(key: str) -> tuple[Array, NDArray[np.int32]]:
-    """A grid of elements of second order."""
+    """A grid of elements of second or higher order."""
     kind, types = FAMILIES[key]
     axes = (SQUARE,) * ELEMENTS[kind].shape.dimension
     points, rows = _grid(kind, axes)

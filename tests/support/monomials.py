@@ -1,4 +1,4 @@
-"""Elements of second order by their spaces of monomials: an oracle that knows nothing of Bezier coefficients."""
+"""Curved elements by their spaces of monomials: an oracle that knows nothing of Bezier coefficients."""
 
 from __future__ import annotations
 
@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.quadratic import SECOND_ORDER
+from meshfix_cli.mesh.elements import Element, element_of
+from meshfix_cli.mesh.quadratic import SECOND_ORDER, Quadratic
 
 Array = NDArray[np.float64]
 CODES = {element.key: code for code, element in enumerate(SECOND_ORDER)}
+# Of higher order: those of an l have nodes at the points of Gauss and Lobatto.
+HIGHER = ("triangle10", "triangle15l", "quad16", "quad25l", "tetra20", "tetra35l", "wedge40", "hexahedron64")
 _QUAD = [(0, 0), (1, 0), (1, 1), (0, 1)]
 _TRIANGLE = [(0, 0), (1, 0), (0, 1)]
 _CORNERS = {
@@ -24,8 +27,35 @@ _CORNERS = {
 }
 
 
+def type_of(key: str) -> Element:
+    """Return a type by its name."""
+    element = element_of(key)
+    assert element is not None
+    return element
+
+
+def order_of(key: str) -> int:
+    """Return the order of a type."""
+    lattice = type_of(key).lattice
+    return 2 if lattice is None else lattice.order
+
+
+def mesh_of(key: str) -> kernels.QuadraticMesh:
+    """Return one element of a type, as the kernels take it."""
+    count = type_of(key).nodes
+    return Quadratic([(key, np.arange(count)[None])], count).kernel
+
+
+def coefficients(key: str, nodes: Array) -> Array:
+    """Return the Bezier coefficients of an element with nodes (n, d)."""
+    return mesh_of(key).coefficients(nodes)
+
+
 def _belongs(key: str, e: tuple[int, ...]) -> bool:
-    """Whether a monomial of these exponents, none above 2, is in the space of a type."""
+    """Whether a monomial of these exponents, none above the order, is in the space of a type."""
+    if key not in CODES:
+        simplex = {"triangle": 2, "wedge": 2, "tetrahedron": 3}.get(type_of(key).shape.name, 0)
+        return sum(e[:simplex]) <= order_of(key)
     if key in ("triangle6", "tetra10"):
         return sum(e) <= 2
     if key in ("wedge15", "wedge18"):
@@ -35,23 +65,24 @@ def _belongs(key: str, e: tuple[int, ...]) -> bool:
 
 def exponents(key: str) -> list[tuple[int, ...]]:
     """Return the exponents of the monomials that span the space of a type."""
-    d = SECOND_ORDER[CODES[key]].shape.dimension
-    return [e for e in product(range(3), repeat=d) if _belongs(key, e)]
+    return [e for e in product(range(order_of(key) + 1), repeat=type_of(key).shape.dimension) if _belongs(key, e)]
 
 
 def positions(key: str) -> Array:
     """Return the nodes (k, d) of the straight element at the corners of the parameters."""
-    corners = np.array(_CORNERS[SECOND_ORDER[CODES[key]].shape.name], dtype=float)
+    corners = np.array(_CORNERS[type_of(key).shape.name], dtype=float)
+    if key not in CODES:
+        return np.concatenate([corners, np.array(type_of(key).weights) @ corners])
     return np.array([corners[mean].mean(axis=0) for mean in kernels.QUADRATIC_SHAPES[CODES[key]][1]])
 
 
 def inside(random: np.random.Generator, key: str, count: int) -> Array:
     """Return parameters (count, d) inside a type."""
-    d = SECOND_ORDER[CODES[key]].shape.dimension
-    at = random.random((4 * count + 40, d)) if "triangle" not in key else random.random((4 * count + 40, 2))
-    if key == "tetra10":
+    d, name = type_of(key).shape.dimension, type_of(key).shape.name
+    at = random.random((4 * count + 40, d)) if name != "triangle" else random.random((4 * count + 40, 2))
+    if name == "tetrahedron":
         at = random.dirichlet(np.ones(4), len(at))[:, :3]
-    if key in ("triangle6", "wedge15", "wedge18"):
+    if name in ("triangle", "wedge"):
         at[:, :2] = random.dirichlet(np.ones(3), len(at))[:, :2]
     return at[:count]
 
@@ -88,6 +119,6 @@ def derivatives(key: str, nodes: Array, at: Array) -> Array:
 
 
 def perturbed(random: np.random.Generator, key: str, size: float) -> Array:
-    """Return the nodes of an element, each moved by a random step."""
+    """Return the nodes of an element, each moved by a random step, which is the smaller the closer they are."""
     nodes = positions(key)
-    return nodes + size * random.normal(size=nodes.shape)
+    return nodes + size * (2 / order_of(key)) ** 2 * random.normal(size=nodes.shape)

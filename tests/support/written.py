@@ -13,20 +13,21 @@ import pytest
 from building import Blocks, Points
 from programs import gmsh_session
 
-from meshfix_cli.mesh.elements import ELEMENTS
-from meshfix_cli.meshfile.gmsh.cells import order_of
+from meshfix_cli.mesh.elements import dimension_of
+from meshfix_cli.meshfile.gmsh.cells import TYPES, order_of
+from meshfix_cli.meshfile.vtk.cells import number_of
 
 Made = Callable[[Path, Points, Blocks], None]
 
 
 def by_gmsh(path: Path, points: Points, cells: Blocks, options: dict[str, float] | None = None) -> None:
     with gmsh_session(SaveAll=1, **options or {}) as gmsh:
-        dimension = ELEMENTS[cells[0][0]].shape.dimension
+        dimension, numbers = dimension_of(cells[0][0]), {key: number for number, (key, _) in TYPES.items()}
         gmsh.model.addDiscreteEntity(dimension, 1)
         gmsh.model.mesh.addNodes(dimension, 1, np.arange(len(points)) + 1, points.ravel())
         for key, rows in cells:
             order = np.argsort(order_of(key) or range(rows.shape[1]))
-            gmsh.model.mesh.addElementsByType(1, ELEMENTS[key].gmsh, [], (rows[:, order] + 1).ravel())
+            gmsh.model.mesh.addElementsByType(1, numbers[key], [], (rows[:, order] + 1).ravel())
         gmsh.write(str(path))
 
 
@@ -45,7 +46,7 @@ def grid_of(points: Points, cells: Blocks) -> Any:
     grid.SetPoints(places)
     for key, rows in cells:
         for row in rows.tolist():
-            grid.InsertNextCell(ELEMENTS[key].vtk, len(row), row)
+            grid.InsertNextCell(number_of(key), len(row), row)
     return grid
 
 

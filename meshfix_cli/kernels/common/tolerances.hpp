@@ -13,7 +13,7 @@ constexpr double VALID = 1e-14;
 constexpr double BEZIER_PLAIN = 2.0;
 constexpr int BEZIER_DEPTH = 60;    // halvings of a hexahedron: 20 in each direction, if it is bent in all
 constexpr int BEZIER_PARTS = 4096;  // of it that are looked at; what is not decided then is not valid
-constexpr int QUADRATIC_PARTS = 4096;  // the same of an element of second order
+constexpr int QUADRATIC_PARTS = 4096;  // the same of a curved element
 
 // Linear programme. All are relative to the largest number of their kind in the star.
 constexpr double LP_DROPPED_FACE2 = 1e-24;  // |n|^2 below which co-located neighbours leave the star
@@ -76,7 +76,7 @@ constexpr double WOLFE_SLOPE = 0.9;    // share of it that may be left
 // of so much of the radius.
 constexpr double FOLDOVER_EXACT = 2e-9, FOLDOVER_INNER = 0.9999;
 
-// Energy of elements of second order: what it costs to differ from the straight element, and the relative gain of the last
+// Energy of curved elements: what it costs to differ from the straight element, and the relative gain of the last
 // iteration of a minimisation.
 constexpr double QUADRATIC_GAIN = 1e-6;  // by which a linear programme must raise the smallest coefficient
 constexpr double QUADRATIC_FLAT = 0.01;  // of what its edges span, the least size of an element

@@ -1,4 +1,4 @@
-// Bindings of what is known of elements of second order.
+// Bindings of what is known of curved elements.
 #include <variant>
 
 #include "arrays.hpp"
@@ -11,23 +11,51 @@ namespace meshfix {
 
 namespace {
 
-void init_mesh(QuadraticMesh* self, const Vector<const std::uint8_t>& codes, const Vector<const std::int32_t>& nodes, std::int64_t n) {
+// Calls f with the dimension and the room that the elements of a mesh need.
+template <class F>
+auto with_room(const QuadraticMesh& mesh, std::size_t d, const F& f) {
+    return with_dimension(d, [&](auto dimension) {
+        return mesh.is_of_second_order() ? f(dimension, SecondOrder{}) : f(dimension, AnyOrder{});
+    });
+}
+
+// places (nodes, coordinates): see quadratic/shapes.hpp.
+void init_type(QuadraticType* self, const std::vector<int>& factors, int order, const Matrix<const double>& places, double weight) {
+    QuadraticShape shape{std::accumulate(factors.begin(), factors.end(), 0), factors, {}, weight, order, {}};
+    for (std::size_t i = 0; i < places.shape(0); ++i)
+        shape.places.emplace_back(places.data() + i * places.shape(1), places.data() + (i + 1) * places.shape(1));
+    if (places.shape(0) > AnyOrder::NODES) throw nb::value_error("the type has too many nodes");
+    new (self) QuadraticType(shape);
+    const auto differences = [self](int j) { return static_cast<int>(self->difference[j].size()); };
+    if (self->coefficients > AnyOrder::COEFFICIENTS || self->normals > AnyOrder::NORMALS ||
+        std::max({differences(0), differences(1), differences(2)}) > AnyOrder::DIFFERENCES) {
+        self->~QuadraticType();
+        throw nb::value_error("the order of the type is too high");
+    }
+}
+
+void init_mesh(QuadraticMesh* self, const Vector<const std::uint8_t>& codes, const Vector<const std::int32_t>& nodes, std::int64_t n,
+               const std::vector<const QuadraticType*>& types) {
     new (self) QuadraticMesh(codes.data(), static_cast<std::int64_t>(codes.shape(0)), nodes.data(),
-                          static_cast<std::int64_t>(nodes.shape(0)), n);
+                             static_cast<std::int64_t>(nodes.shape(0)), n, types);
 }
 
 auto judge_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
-    QuadraticJudgement found = with_dimension(points.shape(1), [&](auto d) { return judge<d>(self, points.data(), threads); });
+    QuadraticJudgement found = with_room(self, points.shape(1), [&](auto dimension, auto room) {
+        constexpr int D = dimension;
+        return judge<D, decltype(room)>(self, points.data(), threads);
+    });
     return std::make_tuple(to_numpy(std::move(found.verdict)), to_numpy(std::move(found.smallest)),
                            to_numpy(std::move(found.measure)), to_numpy(std::move(found.quality)));
 }
 
 auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
     std::vector<double> sizes(self.size());
-    with_dimension(points.shape(1), [&](auto dimension) {
+    with_room(self, points.shape(1), [&](auto dimension, auto room) {
         constexpr int D = dimension;
+        using R = decltype(room);
         for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-            for (std::int64_t e = begin; e < end; ++e) sizes[e] = straight_size<D>(self.type(e), self.local<D>(points.data(), e));
+            for (std::int64_t e = begin; e < end; ++e) sizes[e] = straight_size<D, R>(self.type(e), self.local<D, R>(points.data(), e));
         });
     });
     return to_numpy(std::move(sizes));
@@ -37,14 +65,15 @@ auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int
 auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
                  const Vector<const std::uint8_t>& free, bool of_free, int threads) {
     std::vector<double> smallest(self.size(), INFINITY);
-    with_dimension(points.shape(1), [&](auto dimension) {
+    with_room(self, points.shape(1), [&](auto dimension, auto room) {
         constexpr int D = dimension;
+        using R = decltype(room);
         for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
             for (std::int64_t e = begin; e < end; ++e) {
-                const QuadraticParts<D> parts(self.type(e), self.local<D>(points.data(), e));
-                const std::uint32_t here = self.marked(free.data(), e);
+                const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
+                const NodeSet here = self.marked(free.data(), e);
                 for (int i = 0; i < parts.type->coefficients; ++i)
-                    if (((parts.type->depends[i] & here) != 0) == of_free)
+                    if ((parts.type->depends[i] & here).any() == of_free)
                         smallest[e] = std::min(smallest[e], parts.coefficient[i] / sizes.data()[e]);
             }
         });
@@ -56,43 +85,48 @@ auto relocate_py(const QuadraticMesh& self, const Matrix<const double>& points, 
                  const Vector<const std::uint8_t>& free, const Vector<const std::int32_t>& nodes, const Matrix<const double>& start, double reach,
                  double goal, bool tied) {
     std::vector<double> moved(points.data(), points.data() + points.size());
-    const std::int64_t count = with_dimension(points.shape(1), [&](auto d) {
-        QuadraticSweep<d> sweep(self, moved.data(), sizes.data(), free.data(), {start.data(), reach}, goal, tied);
+    const std::int64_t count = with_room(self, points.shape(1), [&](auto dimension, auto room) {
+        constexpr int D = dimension;
+        QuadraticSweep<D, decltype(room)> sweep(self, moved.data(), sizes.data(), free.data(), {start.data(), reach}, goal, tied);
         return sweep.visit(nodes.data(), static_cast<std::int64_t>(nodes.shape(0)));
     });
     return std::make_pair(to_numpy(std::move(moved), points.shape(1)), count);
 }
 
 auto impossible_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const std::uint8_t>& free) {
-    return to_numpy(with_dimension(points.shape(1), [&](auto d) { return QuadraticProofs<d>(self, points.data(), free.data()).find(); }));
+    return to_numpy(with_room(self, points.shape(1), [&](auto dimension, auto room) {
+        constexpr int D = dimension;
+        return QuadraticProofs<D, decltype(room)>(self, points.data(), free.data()).find();
+    }));
 }
 
 template <int D>
-QuadraticNodes<D> nodes_of(const Matrix<const double>& rows) {
-    QuadraticNodes<D> nodes{};
-    for (std::size_t i = 0; i < std::min<std::size_t>(rows.shape(0), MOST_QUADRATIC_NODES); ++i) nodes[i] = load<D>(rows.data() + i * D);
-    return nodes;
+using OneElement = QuadraticParts<D, AnyOrder>;
+
+template <int D>
+OneElement<D> parts_of(const QuadraticMesh& mesh, const Matrix<const double>& rows) {
+    return OneElement<D>(mesh.type(0), mesh.local<D, AnyOrder>(rows.data(), 0));
 }
 
-auto coefficients_py(const Matrix<const double>& rows, std::uint8_t code) {
-    return to_numpy(with_dimension(rows.shape(1), [&](auto dimension) {
+auto coefficients_py(const QuadraticMesh& self, const Matrix<const double>& points) {
+    return to_numpy(with_dimension(points.shape(1), [&](auto dimension) {
         constexpr int D = dimension;
-        const QuadraticParts<D> parts(quadratic_type(code), nodes_of<D>(rows));
+        const auto parts = parts_of<D>(self, points);
         return std::vector<double>(parts.coefficient.begin(), parts.coefficient.begin() + parts.type->coefficients);
     }));
 }
 
-auto columns_py(const Matrix<const double>& rows, std::uint8_t code, const Vector<const double>& shares) {
-    return to_numpy(with_dimension(rows.shape(1), [&](auto dimension) {
+auto columns_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& shares) {
+    return to_numpy(with_dimension(points.shape(1), [&](auto dimension) {
         constexpr int D = dimension;
-        const QuadraticParts<D> parts(quadratic_type(code), nodes_of<D>(rows));
-        std::array<double, MOST_QUADRATIC_NODES> share{};
-        std::copy_n(shares.data(), std::min<std::size_t>(shares.shape(0), MOST_QUADRATIC_NODES), share.begin());
+        const auto parts = parts_of<D>(self, points);
+        std::array<double, AnyOrder::NODES> share{};
+        std::copy_n(shares.data(), std::min<std::size_t>(shares.shape(0), AnyOrder::NODES), share.begin());
         std::vector<double> found;
         for (const Vec<D>& gradient : parts.gradients(share)) found.insert(found.end(), gradient.begin(), gradient.end());
         found.resize(parts.type->coefficients * D);
         return found;
-    }), rows.shape(1));
+    }), points.shape(1));
 }
 
 // For each type its dimension, the corners of whose mean each node is in the straight element, and the weight.
@@ -103,19 +137,20 @@ auto shapes_py() {
 }
 
 struct PyQuadraticEnergy {
-    template <int D>
-    using Minimiser = Lbfgs<QuadraticEnergy<D>>;
-    std::variant<Minimiser<2>, Minimiser<3>> minimiser;
+    template <int D, class R>
+    using Minimiser = Lbfgs<QuadraticEnergy<D, R>>;
+    std::variant<Minimiser<2, SecondOrder>, Minimiser<3, SecondOrder>, Minimiser<2, AnyOrder>, Minimiser<3, AnyOrder>> minimiser;
 };
 
 void init_energy(PyQuadraticEnergy* self, const QuadraticMesh& mesh, const Matrix<const double>& points, const Matrix<const double>& rest,
                  const Vector<const double>& sizes, const Vector<const std::uint8_t>& free, const Matrix<const double>& start, double reach,
                  int threads) {
-    new (self) PyQuadraticEnergy(with_dimension(points.shape(1), [&](auto dimension) {
+    new (self) PyQuadraticEnergy(with_room(mesh, points.shape(1), [&](auto dimension, auto room) {
         constexpr int D = dimension;
-        QuadraticEnergy<D> energy(mesh, points.data(), rest.data(), sizes.data(), free.data(), {start.data(), reach}, threads);
+        using R = decltype(room);
+        QuadraticEnergy<D, R> energy(mesh, points.data(), rest.data(), sizes.data(), free.data(), {start.data(), reach}, threads);
         const std::int64_t size = energy.size();
-        return PyQuadraticEnergy{PyQuadraticEnergy::Minimiser<D>(std::move(energy), size, threads)};
+        return PyQuadraticEnergy{PyQuadraticEnergy::Minimiser<D, R>(std::move(energy), size, threads)};
     }));
 }
 
@@ -148,10 +183,13 @@ auto evaluate_py(PyQuadraticEnergy& self, const Vector<const double>& variables,
 
 void bind_quadratic(nb::module_& m) {
     m.attr("QUADRATIC_SHAPES") = nb::cast(shapes_py());
-    m.def("quadratic_coefficients", &coefficients_py, "nodes"_a.noconvert(), "code"_a);
-    m.def("quadratic_columns", &columns_py, "nodes"_a.noconvert(), "code"_a, "shares"_a.noconvert());
+    nb::class_<QuadraticType>(m, "QuadraticType")
+        .def("__init__", &init_type, "factors"_a, "order"_a, "places"_a.noconvert(), "weight"_a);
     nb::class_<QuadraticMesh>(m, "QuadraticMesh")
-        .def("__init__", &init_mesh, "codes"_a.noconvert(), "nodes"_a.noconvert(), "n"_a)
+        .def("__init__", &init_mesh, "codes"_a.noconvert(), "nodes"_a.noconvert(), "n"_a, "types"_a = std::vector<const QuadraticType*>(),
+             nb::keep_alive<1, 5>())
+        .def("coefficients", &coefficients_py, "points"_a.noconvert())
+        .def("columns", &columns_py, "points"_a.noconvert(), "shares"_a.noconvert())
         .def("judge", &judge_py, "points"_a.noconvert(), "threads"_a)
         .def("sizes", &sizes_py, "points"_a.noconvert(), "threads"_a)
         .def("smallest", &smallest_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "of_free"_a, "threads"_a)

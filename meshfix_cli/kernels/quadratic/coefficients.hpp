@@ -1,4 +1,4 @@
-// Bezier coefficients of the Jacobian determinant of elements of second order: their values, the slope of a function of them,
+// Bezier coefficients of the Jacobian determinant of curved elements: their values, the slope of a function of them,
 // and their gradients by one node; whether an element is valid.
 //
 // det J is D1 . (D2 x D3): the products of the last two are added up first, which takes a tenth of the time of all triples.
@@ -13,27 +13,30 @@
 
 namespace meshfix {
 
-template <int D>
-using QuadraticNodes = std::array<Vec<D>, MOST_QUADRATIC_NODES>;
+template <int D, class R>
+using QuadraticNodes = std::array<Vec<D>, R::NODES>;
 
-template <int D>
+// Sets as many of the values to zero as are needed.
+template <class T, std::size_t N>
+void clear(std::array<T, N>& values, int count) {
+    std::fill_n(values.begin(), count, T{});
+}
+
+template <int D, class R>
 struct QuadraticParts {
     const QuadraticType* type;
-    QuadraticNodes<D> control;
-    std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3> difference;
-    std::array<Vec<D>, MOST_NORMALS> normal;  // 3-D
-    std::array<double, MOST_QUADRATIC_COEFFICIENTS> coefficient;
+    QuadraticNodes<D, R> control;
+    std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> difference;
+    std::array<Vec<D>, R::NORMALS> normal;  // 3-D
+    std::array<double, R::COEFFICIENTS> coefficient;
 
-    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D>& nodes) : type(&of) {
+    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D, R>& nodes) : type(&of) {
         for (int c = 0; c < of.controls; ++c) control[c] = weighted(of.control_of_nodes[c], nodes);
         find();
     }
 
-    // One half of an element.
-    QuadraticParts(const QuadraticParts& whole, const std::vector<Sum>& half) : type(whole.type) {
-        for (int c = 0; c < type->controls; ++c) control[c] = weighted(half[c], whole.control);
-        find();
-    }
+    // Those of a part of an element, by its control points.
+    static QuadraticParts of_controls(const QuadraticType& of, const QuadraticNodes<D, R>& points) { return {of, points, 0}; }
 
     // The smallest coefficient; NaN where one is.
     double smallest() const {
@@ -47,10 +50,10 @@ struct QuadraticParts {
 
     // What rounding leaves in doubt of the coefficients.
     double doubt() const {
-        double product = VALID;
+        double product = type->doubt;
         for (int j = 0; j < D; ++j) {
             double longest = 0.0;
-            for (std::size_t p = 0; p < type->difference[j].size(); ++p) longest = std::max(longest, norm2(difference[j][p]));
+            for (std::size_t p = 0; p < type->difference[j].size(); ++p) longest = std::max(longest, type->share2[j][p] * norm2(difference[j][p]));
             product *= std::sqrt(longest);
         }
         return product;
@@ -64,19 +67,22 @@ struct QuadraticParts {
     }
 
     // The derivative by the nodes of a function whose derivatives by the coefficients are given.
-    QuadraticNodes<D> slopes(const std::array<double, MOST_QUADRATIC_COEFFICIENTS>& by_coefficient) const {
-        std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3> by_difference{};
-        std::array<double, MOST_QUADRATIC_COEFFICIENTS> g;
+    QuadraticNodes<D, R> slopes(const std::array<double, R::COEFFICIENTS>& by_coefficient) const {
+        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> by_difference;
+        for (int j = 0; j < D; ++j) clear(by_difference[j], size(j));
+        std::array<double, R::COEFFICIENTS> g;
         for (int i = 0; i < type->coefficients; ++i) g[i] = by_coefficient[i] * type->unscaled[i];
         pull_back(g.data(), by_difference);
-        QuadraticNodes<D> found{};
+        QuadraticNodes<D, R> found;
+        clear(found, type->nodes);
         add_to_nodes(by_difference, found);
         return found;
     }
 
     // Adds to the slopes of nodes what the slopes by differences make of them.
-    void add_to_nodes(const std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3>& by_difference, QuadraticNodes<D>& found) const {
-        QuadraticNodes<D> by_control{};
+    void add_to_nodes(const std::array<std::array<Vec<D>, R::DIFFERENCES>, 3>& by_difference, QuadraticNodes<D, R>& found) const {
+        QuadraticNodes<D, R> by_control;
+        clear(by_control, type->controls);
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < type->difference[j].size(); ++p)
                 for (const Share& one : type->difference[j][p])
@@ -86,15 +92,18 @@ struct QuadraticParts {
     }
 
     // The gradients of all coefficients by the displacement x of some nodes, each of which moves by `share` x.
-    std::array<Vec<D>, MOST_QUADRATIC_COEFFICIENTS> gradients(const std::array<double, MOST_QUADRATIC_NODES>& share) const {
-        std::array<std::array<double, MOST_DIFFERENCES>, 3> moves{};
-        std::array<double, MOST_QUADRATIC_NODES> of_control{};
+    std::array<Vec<D>, R::COEFFICIENTS> gradients(const std::array<double, R::NODES>& share) const {
+        std::array<std::array<double, R::DIFFERENCES>, 3> moves;
+        for (int j = 0; j < D; ++j) clear(moves[j], size(j));
+        std::array<double, R::NODES> of_control;
+        clear(of_control, type->controls);
         for (int c = 0; c < type->controls; ++c)
             for (const Share& one : type->control_of_nodes[c]) of_control[c] += one.weight * share[one.of];
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < type->difference[j].size(); ++p)
                 for (const Share& one : type->difference[j][p]) moves[j][p] += one.weight * of_control[one.of];
-        std::array<Vec<D>, MOST_QUADRATIC_COEFFICIENTS> found{};
+        std::array<Vec<D>, R::COEFFICIENTS> found;
+        clear(found, type->coefficients);
         const int *to = type->coefficient_of.data(), count0 = size(0), count1 = size(1);
         if constexpr (D == 2) {
             for (int p = 0; p < count0; ++p)
@@ -104,7 +113,8 @@ struct QuadraticParts {
                     found[i] = found[i] + Vec<2>{b[1], -b[0]};
                 }
         } else {
-            std::array<Vec<3>, MOST_NORMALS> turned{};
+            std::array<Vec<3>, R::NORMALS> turned;
+            clear(turned, type->normals);
             const int* at = type->normal_of.data();
             for (int q = 0; q < count1; ++q)
                 for (int r = 0; r < size(2); ++r, ++at)
@@ -119,12 +129,17 @@ struct QuadraticParts {
         return found;
     }
 
-   private:
     template <std::size_t N>
     static Vec<D> weighted(const Sum& sum, const std::array<Vec<D>, N>& values) {
         Vec<D> total{};
         for (const Share& one : sum) total = total + one.weight * values[one.of];
         return total;
+    }
+
+   private:
+    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D, R>& points, int) : type(&of) {
+        std::copy_n(points.begin(), of.controls, control.begin());
+        find();
     }
 
     int size(int direction) const { return static_cast<int>(type->difference[direction].size()); }
@@ -135,13 +150,13 @@ struct QuadraticParts {
                 const Sum& d = type->difference[j][p];
                 difference[j][p] = d[0].weight * (control[d[0].of] - control[d[1].of]);
             }
-        std::fill_n(coefficient.begin(), type->coefficients, 0.0);
+        clear(coefficient, type->coefficients);
         const int* to = type->coefficient_of.data();
         if constexpr (D == 2) {
             for (int p = 0; p < size(0); ++p)
                 for (int q = 0; q < size(1); ++q) coefficient[*to++] += cross(difference[0][p], difference[1][q]);
         } else {
-            std::fill_n(normal.begin(), type->normals, Vec<3>{});
+            clear(normal, type->normals);
             const int* at = type->normal_of.data();
             for (int q = 0; q < size(1); ++q)
                 for (int r = 0; r < size(2); ++r, ++at) normal[*at] = normal[*at] + cross(difference[1][q], difference[2][r]);
@@ -151,7 +166,7 @@ struct QuadraticParts {
         for (int i = 0; i < type->coefficients; ++i) coefficient[i] *= type->unscaled[i];
     }
 
-    void pull_back(const double* g, std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3>& by_difference) const {
+    void pull_back(const double* g, std::array<std::array<Vec<D>, R::DIFFERENCES>, 3>& by_difference) const {
         const int* to = type->coefficient_of.data();
         if constexpr (D == 2) {
             for (int p = 0; p < size(0); ++p)
@@ -162,7 +177,8 @@ struct QuadraticParts {
                     by_difference[1][q] = by_difference[1][q] + here * Vec<2>{-a[1], a[0]};
                 }
         } else {
-            std::array<Vec<3>, MOST_NORMALS> by_normal{};
+            std::array<Vec<3>, R::NORMALS> by_normal;
+            clear(by_normal, type->normals);
             for (int p = 0; p < size(0); ++p)
                 for (int k = 0; k < type->normals; ++k) {
                     const double here = g[*to++];
@@ -179,16 +195,20 @@ struct QuadraticParts {
     }
 };
 
-// A part of an element, and how long its edges are in the parameters, where those of the whole have the length 1.
-template <int D>
+// A part of an element: its control points, and how long its edges are in the parameters, where those of the whole have the
+// length 1.
+template <int D, class R>
 struct QuadraticPart {
-    QuadraticParts<D> parts;
+    QuadraticNodes<D, R> control;
     std::array<double, 6> length2;  // for each way to halve
 
     // The half by edge `k` in which the end `kept` stays and the other one is the middle.
-    QuadraticPart half(std::size_t k, int kept) const {
-        const auto& cut = parts.type->cut;
-        QuadraticPart found{{parts, parts.type->halves[k][kept]}, length2};
+    QuadraticPart half(const QuadraticType& type, std::size_t k, int kept) const {
+        const auto& cut = type.cut;
+        const std::vector<Sum>& of = type.halves[k][kept];
+        QuadraticPart found;
+        for (int c = 0; c < type.controls; ++c) found.control[c] = QuadraticParts<D, R>::weighted(of[c], control);
+        found.length2 = length2;
         const int stays = cut[k][kept], moves = cut[k][1 - kept];
         for (std::size_t i = 0; i < cut.size(); ++i) {
             if (i == k || (cut[i][0] != moves && cut[i][1] != moves)) continue;
@@ -204,26 +224,27 @@ struct QuadraticPart {
 
 // Whether det J is positive everywhere, and that is proved: the coefficients of parts of the element, each a half of another,
 // by the edge that is longest in the parameters.
-template <int D>
-bool is_positive(const QuadraticParts<D>& whole) {
+template <int D, class R>
+bool is_positive(const QuadraticParts<D, R>& whole) {
     const QuadraticType& type = *whole.type;
-    std::vector<QuadraticPart<D>> waiting{{whole, {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}}};
+    std::vector<QuadraticPart<D, R>> waiting{{whole.control, {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}}};
     for (int seen = 0; !waiting.empty(); ++seen) {
-        const QuadraticPart<D> part = waiting.back();
+        const QuadraticPart<D, R> part = waiting.back();
         waiting.pop_back();
-        if (part.parts.smallest() > part.parts.doubt()) continue;
+        const auto parts = QuadraticParts<D, R>::of_controls(type, part.control);
+        if (parts.smallest() > parts.doubt()) continue;
         for (const int corner : type.corner_coefficient)
-            if (!(part.parts.coefficient[corner] > 0.0)) return false;
+            if (!(parts.coefficient[corner] > 0.0)) return false;
         if (seen == QUADRATIC_PARTS) return false;
         const auto longest = std::max_element(part.length2.begin(), part.length2.begin() + type.cut.size()) - part.length2.begin();
-        for (int kept = 0; kept < 2; ++kept) waiting.push_back(part.half(static_cast<std::size_t>(longest), kept));
+        for (int kept = 0; kept < 2; ++kept) waiting.push_back(part.half(type, static_cast<std::size_t>(longest), kept));
     }
     return true;
 }
 
 // Where an element is not valid; at a node goes before inside. Never valid for NaN.
-template <int D>
-Verdict judge(const QuadraticParts<D>& parts) {
+template <int D, class R>
+Verdict judge(const QuadraticParts<D, R>& parts) {
     const QuadraticType& type = *parts.type;
     const double bound = parts.doubt();
     if (parts.smallest() > bound) return Verdict::valid;
@@ -233,27 +254,26 @@ Verdict judge(const QuadraticParts<D>& parts) {
 }
 
 // The straight element of the same corners.
-template <int D>
-QuadraticNodes<D> straightened(const QuadraticType& type, const QuadraticNodes<D>& nodes) {
-    QuadraticNodes<D> straight;
+template <int D, class R>
+QuadraticNodes<D, R> straightened(const QuadraticType& type, const QuadraticNodes<D, R>& nodes) {
+    QuadraticNodes<D, R> straight;
     for (int i = 0; i < type.nodes; ++i) {
         straight[i] = Vec<D>{};
-        const double share = 1.0 / static_cast<double>(type.between[i].size());
-        for (const int corner : type.between[i]) straight[i] = straight[i] + share * nodes[corner];
+        for (const Share& one : type.between[i]) straight[i] = straight[i] + one.weight * nodes[one.of];
     }
     return straight;
 }
 
 // det J of the straight element in the mean, the size that coefficients are compared with; of a flat one, which may be well all
 // the same where its nodes are not on its edges, a share of what its edges span.
-template <int D>
-double straight_size(const QuadraticType& type, const QuadraticNodes<D>& nodes) {
-    const QuadraticParts<D> parts(type, straightened<D>(type, nodes));
+template <int D, class R>
+double straight_size(const QuadraticType& type, const QuadraticNodes<D, R>& nodes) {
+    const QuadraticParts<D, R> parts(type, straightened<D, R>(type, nodes));
     double sum = 0.0, span = QUADRATIC_FLAT;
     for (int i = 0; i < type.coefficients; ++i) sum += parts.coefficient[i];
     for (int j = 0; j < D; ++j) {
         double length2 = 0.0;
-        for (std::size_t p = 0; p < type.difference[j].size(); ++p) length2 += norm2(parts.difference[j][p]);
+        for (std::size_t p = 0; p < type.difference[j].size(); ++p) length2 += type.share2[j][p] * norm2(parts.difference[j][p]);
         span *= std::sqrt(length2 / static_cast<double>(type.difference[j].size()));
     }
     return std::max(sum / type.coefficients, span);
@@ -281,8 +301,8 @@ double longest_edges2(const QuadraticType& type, const Edges<D>& derivatives) {
 }
 
 // The smallest scaled Jacobian at the nodes; 0 where a derivative is none.
-template <int D>
-double scaled_jacobian(const QuadraticParts<D>& parts) {
+template <int D, class R>
+double scaled_jacobian(const QuadraticParts<D, R>& parts) {
     double smallest = INFINITY;
     for (int node = 0; node < parts.type->nodes; ++node) {
         const Edges<D> e = parts.at_node(node);

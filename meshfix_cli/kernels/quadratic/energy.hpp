@@ -1,4 +1,4 @@
-// An energy of elements of second order that is small where no Bezier coefficient of det J is small:
+// An energy of curved elements that is small where no Bezier coefficient of det J is small:
 //
 //     sum over elements of  mean over coefficients of (1 + t^2) / chi(t)
 //                           + STRAIGHT sum over directions of mean |D - D0|^2 / mean |D0|^2,
@@ -24,7 +24,7 @@ struct QuadraticGoal {
 
 // What is minimised over: the elements that have a free node. Variables are the steps of these from where they are, each in a
 // unit of its own.
-template <int D>
+template <int D, class R>
 class QuadraticEnergy {
    public:
     QuadraticGoal goal{};
@@ -36,18 +36,19 @@ class QuadraticEnergy {
         for (std::int64_t v = 0; v < mesh.n; ++v)
             if (free[v] && mesh.at_offsets[v] < mesh.at_offsets[v + 1]) moving_.push_back(static_cast<std::int32_t>(v));
         for (std::int64_t e = 0; e < mesh.size(); ++e) {
-            const std::uint32_t here = mesh.marked(free, e);
-            if (here == 0) continue;
+            const NodeSet here = mesh.marked(free, e);
+            if (!here.any()) continue;
             elements_.push_back(static_cast<std::int32_t>(e));
             free_.push_back(here);
             sizes_.push_back(sizes[e]);
             at_rest(e, rest);
+            slopes_at_.push_back(slopes_at_.back() + mesh.type(e).nodes);
         }
         start_ = points_;
         radius_ = reach.radius;
         centre_in(reach);
         parts_.resize(items());
-        slopes_.resize(elements_.size());
+        slopes_.resize(slopes_at_.back());
         place_of_.assign(mesh.size(), -1);
         for (std::size_t i = 0; i < elements_.size(); ++i) place_of_[elements_[i]] = static_cast<std::int32_t>(i);
         find_units();
@@ -87,23 +88,20 @@ class QuadraticEnergy {
     struct Part {
         double energy = 0.0, smallest = INFINITY;
     };
-    struct Rest {
-        std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3> difference;
-        std::array<double, 3> stiffness;  // for each direction what |D - D0|^2 is multiplied by
-    };
-
     std::int64_t items() const { return (static_cast<std::int64_t>(elements_.size()) + QUADRATIC_PER_ITEM - 1) / QUADRATIC_PER_ITEM; }
 
     void at_rest(std::int64_t e, const double* rest) {
         const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D> parts(type, straightened<D>(type, mesh_->local<D>(rest, e)));
-        Rest found{parts.difference, {}};
+        const QuadraticParts<D, R> parts(type, straightened<D, R>(type, mesh_->local<D, R>(rest, e)));
+        std::array<double, 3> stiffness{};
+        rest_at_.push_back(rest_.size());
         for (int j = 0; j < D; ++j) {
+            rest_.insert(rest_.end(), parts.difference[j].begin(), parts.difference[j].begin() + type.difference[j].size());
             double sum = 0.0;
-            for (std::size_t p = 0; p < type.difference[j].size(); ++p) sum += norm2(parts.difference[j][p]);
-            found.stiffness[j] = sum > 0.0 ? QUADRATIC_STRAIGHT / sum : 0.0;
+            for (std::size_t p = 0; p < type.difference[j].size(); ++p) sum += type.share2[j][p] * norm2(parts.difference[j][p]);
+            stiffness[j] = sum > 0.0 ? QUADRATIC_STRAIGHT / sum : 0.0;
         }
-        rest_.push_back(found);
+        stiffness_.push_back(stiffness);
     }
 
     // The variables at the start, in balls, by nodes; those that are on the rim are drawn inside.
@@ -150,34 +148,37 @@ class QuadraticEnergy {
     void look_at(std::int64_t i, Part& part) {
         const std::int32_t e = elements_[i];
         const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D> parts(type, mesh_->local<D>(points_.data(), e));
-        std::array<double, MOST_QUADRATIC_COEFFICIENTS> slope;
+        const QuadraticParts<D, R> parts(type, mesh_->local<D, R>(points_.data(), e));
+        std::array<double, R::COEFFICIENTS> slope;
         const double to_b = 1.0 / sizes_[i], to_t = 1.0 / (1.0 - goal.floor), share = 1.0 / type.coefficients;
         double sum = 0.0;
         for (int k = 0; k < type.coefficients; ++k) {
             const double b = parts.coefficient[k] * to_b, t = (b - goal.floor) * to_t;
             slope[k] = 0.0;
-            if ((type.depends[k] & free_[i]) == 0) continue;  // nothing can be done about it
+            if (!(type.depends[k] & free_[i]).any()) continue;  // nothing can be done about it
             const Chi<double> chi(t, goal.eps);
             const double value = (1.0 + t * t) * chi.inverse;
             sum += value;
             slope[k] = share * to_t * to_b * (2.0 * t * chi.inverse - value * chi.decay);
             if (!(b >= part.smallest)) part.smallest = b;
         }
-        slopes_[i] = parts.slopes(slope);
-        part.energy += share * sum + straightness(i, parts);
+        QuadraticNodes<D, R> slopes = parts.slopes(slope);
+        part.energy += share * sum + straightness(i, parts, slopes);
+        std::copy_n(slopes.begin(), type.nodes, slopes_.begin() + slopes_at_[i]);
     }
 
-    double straightness(std::int64_t i, const QuadraticParts<D>& parts) {
-        std::array<std::array<Vec<D>, MOST_DIFFERENCES>, 3> pull{};
+    double straightness(std::int64_t i, const QuadraticParts<D, R>& parts, QuadraticNodes<D, R>& slopes) const {
+        const Vec<D>* rest = rest_.data() + rest_at_[i];
+        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> pull;
         double sum = 0.0;
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < parts.type->difference[j].size(); ++p) {
-                const Vec<D> off = parts.difference[j][p] - rest_[i].difference[j][p];
-                sum += rest_[i].stiffness[j] * norm2(off);
-                pull[j][p] = (2.0 * rest_[i].stiffness[j]) * off;
+                const Vec<D> off = parts.difference[j][p] - *rest++;
+                const double stiffness = parts.type->share2[j][p] * stiffness_[i][j];
+                sum += stiffness * norm2(off);
+                pull[j][p] = (2.0 * stiffness) * off;
             }
-        parts.add_to_nodes(pull, slopes_[i]);
+        parts.add_to_nodes(pull, slopes);
         return sum;
     }
 
@@ -186,7 +187,7 @@ class QuadraticEnergy {
         const std::int32_t v = moving_[i];
         for (std::int32_t k = mesh_->at_offsets[v]; k < mesh_->at_offsets[v + 1]; ++k) {
             const std::int32_t place = mesh_->at[k], e = mesh_->owners[place];
-            sum = sum + slopes_[place_of_[e]][place - mesh_->offsets[e]];
+            sum = sum + slopes_[slopes_at_[place_of_[e]] + place - mesh_->offsets[e]];
         }
         sum = by_step(i, sum);
         for (int k = 0; k < D; ++k) gradient[i * D + k] = unit_[i] * sum[k];
@@ -196,10 +197,11 @@ class QuadraticEnergy {
     std::vector<double> points_, start_, sizes_, unit_;
     int threads_;
     std::vector<std::int32_t> moving_, elements_, place_of_;
-    std::vector<std::uint32_t> free_;
-    std::vector<Rest> rest_;
+    std::vector<NodeSet> free_;
+    std::vector<Vec<D>> rest_, slopes_;                   // differences at rest, and slopes of nodes, of one element behind the other
+    std::vector<std::size_t> rest_at_, slopes_at_{0};
+    std::vector<std::array<double, 3>> stiffness_;        // for each direction what |D - D0|^2 is multiplied by
     std::vector<Part> parts_;
-    std::vector<QuadraticNodes<D>> slopes_;
     std::vector<Vec<D>> centre_, inside_;  // of the balls, and the variables of these at the start
     double radius_ = INFINITY;
     double last_ = 0.0, smallest_ = INFINITY;

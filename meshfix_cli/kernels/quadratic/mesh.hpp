@@ -1,4 +1,4 @@
-// A mesh of elements of second order: which elements each node is of, and passes over them.
+// A mesh of curved elements: which elements each node is of, and passes over them.
 #pragma once
 
 #include <numeric>
@@ -11,17 +11,22 @@ namespace meshfix {
 
 constexpr std::int64_t QUADRATIC_PER_ITEM = 64;
 
-// codes (m), offsets (m+1), nodes: as in mesh/elements.hpp, of the types of quadratic/types.hpp. n: number of points.
+// codes (m), offsets (m+1), nodes: as in mesh/elements.hpp, of the types of quadratic/shapes.hpp and behind these of others that are
+// given. n: number of points.
 struct QuadraticMesh {
+    std::vector<const QuadraticType*> types;
     std::vector<std::uint8_t> codes;
     std::vector<std::int32_t> offsets, nodes;
     std::int64_t n;
     std::vector<std::int32_t> at_offsets, at;  // for each point the places in `nodes` where it is named
     std::vector<std::int32_t> owners;          // the element of each place
 
-    QuadraticMesh(const std::uint8_t* types, std::int64_t m, const std::int32_t* named, std::int64_t count, std::int64_t points)
-        : codes(types, types + m), offsets(m + 1, 0), nodes(named, named + count), n(points), at_offsets(points + 1, 0), at(count),
+    QuadraticMesh(const std::uint8_t* of, std::int64_t m, const std::int32_t* named, std::int64_t count, std::int64_t points,
+                  const std::vector<const QuadraticType*>& others)
+        : codes(of, of + m), offsets(m + 1, 0), nodes(named, named + count), n(points), at_offsets(points + 1, 0), at(count),
           owners(count) {
+        for (std::size_t i = 0; i < quadratic_shapes().size(); ++i) types.push_back(&quadratic_type(i));
+        types.insert(types.end(), others.begin(), others.end());
         for (std::int64_t e = 0; e < m; ++e) {
             offsets[e + 1] = offsets[e] + type(e).nodes;
             std::fill(owners.begin() + offsets[e], owners.begin() + offsets[e + 1], static_cast<std::int32_t>(e));
@@ -33,23 +38,25 @@ struct QuadraticMesh {
     }
 
     std::int64_t size() const { return static_cast<std::int64_t>(codes.size()); }
-    const QuadraticType& type(std::int64_t e) const { return quadratic_type(codes[e]); }
+    const QuadraticType& type(std::int64_t e) const { return *types[codes[e]]; }
+    bool is_of_second_order() const { return types.size() == quadratic_shapes().size(); }
     const std::int32_t* nodes_of(std::int64_t e) const { return nodes.data() + offsets[e]; }
 
     // The nodes of an element, from its first on: what rounding does depends on the size of the element alone.
-    template <int D>
-    QuadraticNodes<D> local(const double* points, std::int64_t e) const {
-        QuadraticNodes<D> found;
+    template <int D, class R>
+    QuadraticNodes<D, R> local(const double* points, std::int64_t e) const {
+        QuadraticNodes<D, R> found;
         const Vec<D> origin = load<D>(points + static_cast<std::int64_t>(nodes_of(e)[0]) * D);
         for (int i = 0; i < type(e).nodes; ++i) found[i] = load<D>(points + static_cast<std::int64_t>(nodes_of(e)[i]) * D) - origin;
         return found;
     }
 
-    // The nodes of an element that are marked, as bits.
-    std::uint32_t marked(const std::uint8_t* mask, std::int64_t e) const {
-        std::uint32_t bits = 0;
-        for (int i = 0; i < type(e).nodes; ++i) bits |= static_cast<std::uint32_t>(mask[nodes_of(e)[i]] != 0) << i;
-        return bits;
+    // The nodes of an element that are marked.
+    NodeSet marked(const std::uint8_t* mask, std::int64_t e) const {
+        NodeSet found;
+        for (int i = 0; i < type(e).nodes; ++i)
+            if (mask[nodes_of(e)[i]] != 0) found.add(i);
+        return found;
     }
 };
 
@@ -66,7 +73,7 @@ struct QuadraticJudgement {
     std::vector<double> smallest, measure, quality;
 };
 
-template <int D>
+template <int D, class R>
 QuadraticJudgement judge(const QuadraticMesh& mesh, const double* points, int threads) {
     QuadraticJudgement found;
     found.verdict.resize(mesh.size());
@@ -74,13 +81,13 @@ QuadraticJudgement judge(const QuadraticMesh& mesh, const double* points, int th
     for_each_range(mesh.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         for (std::int64_t e = begin; e < end; ++e) {
             const QuadraticType& type = mesh.type(e);
-            const QuadraticNodes<D> nodes = mesh.local<D>(points, e);
-            const QuadraticParts<D> parts(type, nodes);
+            const QuadraticNodes<D, R> nodes = mesh.local<D, R>(points, e);
+            const QuadraticParts<D, R> parts(type, nodes);
             const auto finite = [](double x) { return std::isfinite(x) ? x : 0.0; };
             double sum = 0.0;
             for (int i = 0; i < type.coefficients; ++i) sum += parts.coefficient[i];
             found.verdict[e] = static_cast<std::uint8_t>(judge(parts));
-            found.smallest[e] = finite(parts.smallest() / straight_size<D>(type, nodes));
+            found.smallest[e] = finite(parts.smallest() / straight_size<D, R>(type, nodes));
             found.measure[e] = sum / type.coefficients * type.integral;
             found.quality[e] = finite(scaled_jacobian(parts));
         }

@@ -1,4 +1,4 @@
-// What cannot be valid as long as the fixed nodes of elements of second order stay, wherever the others go.
+// What cannot be valid as long as the fixed nodes of curved elements stay, wherever the others go.
 //
 // det J at a place of an element depends on some of its nodes. Where all of these are fixed and it is not positive, that is
 // a proof. It is affine in each node, and at a corner in the tangent of each edge: where the elements around one free node,
@@ -14,20 +14,7 @@
 
 namespace meshfix {
 
-constexpr int QUADRATIC_STEPS = 4;  // of the lattice along an edge: nodes are among its places
-
-// Where det J of elements of a type is looked at.
-inline const std::vector<QuadraticType::Place>& quadratic_places(std::uint8_t code) {
-    static const auto places = [] {
-        std::vector<std::vector<QuadraticType::Place>> found;
-        for (std::size_t i = 0; i < quadratic_shapes().size(); ++i)
-            found.push_back(quadratic_type(static_cast<std::uint8_t>(i)).lattice(QUADRATIC_STEPS));
-        return found;
-    }();
-    return places[code];
-}
-
-template <int D>
+template <int D, class R>
 class QuadraticProofs {
    public:
     // free (n).
@@ -40,7 +27,7 @@ class QuadraticProofs {
         std::vector<std::int32_t> nodes;
         std::vector<Edge> edges;
         for (std::int32_t e = 0; e < mesh_->size(); ++e) {
-            const QuadraticParts<D> parts(mesh_->type(e), mesh_->local<D>(points_, e));
+            const QuadraticParts<D, R> parts(mesh_->type(e), mesh_->local<D, R>(points_, e));
             if (judge(parts) == Verdict::valid) continue;
             if (cannot_be_valid(e, parts)) found_[e] = 1;
             for (int k = 0; k < parts.type->nodes; ++k) {
@@ -54,43 +41,40 @@ class QuadraticProofs {
         for (const std::int32_t v : nodes) look_at_node(v);
         std::sort(edges.begin(), edges.end());
         edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
-        for (const auto& [corner, middle] : edges) look_at_tangent(corner, middle);
+        for (const auto& [corner, nearest] : edges) look_at_tangent(corner, nearest);
         return found_;
     }
 
    private:
-    using Edge = std::array<std::int32_t, 2>;  // a corner and the node in the middle
+    using Edge = std::array<std::int32_t, 2>;  // a corner and the node nearest to it
 
     // Whether det J of an element that is not valid is so at a place that no free node changes; of one without free nodes always.
-    bool cannot_be_valid(std::int32_t e, const QuadraticParts<D>& parts) const {
-        const std::uint32_t free = mesh_->marked(free_, e);
-        if (free == 0) return true;
-        for (const auto& [place, depends] : quadratic_places(mesh_->codes[e]))
-            if ((depends & free) == 0 && !(value(place, parts) > bound(place, parts))) return true;
+    bool cannot_be_valid(std::int32_t e, const QuadraticParts<D, R>& parts) const {
+        const NodeSet free = mesh_->marked(free_, e);
+        if (!free.any()) return true;
+        for (const auto& [place, depends] : mesh_->type(e).places())
+            if (!(depends & free).any() && !(value(place, parts) > bound(place, parts))) return true;
         return false;
     }
 
     // At a corner what rounding leaves in doubt of a coefficient is, as in verdicts, not positive.
-    static double bound(const Sum& place, const QuadraticParts<D>& parts) { return place.size() == 1 ? parts.doubt() : 0.0; }
+    static double bound(const Sum& place, const QuadraticParts<D, R>& parts) { return place.size() == 1 ? parts.doubt() : 0.0; }
 
-    static double value(const Sum& place, const QuadraticParts<D>& parts) {
+    static double value(const Sum& place, const QuadraticParts<D, R>& parts) {
         double sum = 0.0;
         for (const Share& one : place) sum += one.weight * parts.coefficient[one.of];
         return sum;
     }
 
-    // The node in the middle of the one edge at a fixed corner whose tangent is free; 0: there is none, or are several.
+    // The nearest node of the one edge at a fixed corner whose tangent is free; 0: there is none, or are several.
     int open_at(std::int32_t e, int corner) const {
-        const QuadraticType& type = mesh_->type(e);
         const std::int32_t* nodes = mesh_->nodes_of(e);
         int open = 0;
         if (free_[nodes[corner]]) return 0;
-        for (int k = type.corners; k < type.nodes; ++k) {
-            const auto& ends = type.between[k];
-            if (ends.size() != 2 || (ends[0] != corner && ends[1] != corner)) continue;
-            if (!free_[nodes[k]] && !free_[nodes[ends[0] == corner ? ends[1] : ends[0]]]) continue;
+        for (const auto& edge : mesh_->type(e).edges_at[corner]) {
+            if (std::none_of(edge.begin(), edge.end(), [&](int k) { return free_[nodes[k]] != 0; })) continue;
             if (open > 0) return 0;
-            open = k;
+            open = edge[0];
         }
         return open;
     }
@@ -100,22 +84,24 @@ class QuadraticProofs {
         begin(v);
         for (std::int32_t i = mesh_->at_offsets[v]; i < mesh_->at_offsets[v + 1]; ++i) {
             const std::int32_t e = mesh_->owners[mesh_->at[i]], here = mesh_->at[i] - mesh_->offsets[e];
-            const std::uint32_t one = 1u << here, others = mesh_->marked(free_, e) & ~one;
+            NodeSet one;
+            one.add(here);
+            const NodeSet others = mesh_->marked(free_, e).without(one);
             std::vector<const Sum*> open;
-            for (const auto& [place, depends] : quadratic_places(mesh_->codes[e]))
-                if ((depends & one) != 0 && (depends & others) == 0) open.push_back(&place);
+            for (const auto& [place, depends] : mesh_->type(e).places())
+                if ((depends & one).any() && !(depends & others).any()) open.push_back(&place);
             add(e, here, open);
         }
         prove();
     }
 
     // The places at a corner of elements of which one edge, the same, has a free tangent there.
-    void look_at_tangent(std::int32_t corner, std::int32_t middle) {
+    void look_at_tangent(std::int32_t corner, std::int32_t nearest) {
         begin(corner);
         for (std::int32_t i = mesh_->at_offsets[corner]; i < mesh_->at_offsets[corner + 1]; ++i) {
             const std::int32_t e = mesh_->owners[mesh_->at[i]], here = mesh_->at[i] - mesh_->offsets[e];
             const int open = here < mesh_->type(e).corners ? open_at(e, here) : 0;
-            if (open == 0 || mesh_->nodes_of(e)[open] != middle) continue;
+            if (open == 0 || mesh_->nodes_of(e)[open] != nearest) continue;
             const Sum value{{mesh_->type(e).corner_coefficient[here], 1.0}};
             add(e, open, {&value});
         }
@@ -135,14 +121,14 @@ class QuadraticProofs {
     void add(std::int32_t e, int node, const std::vector<const Sum*>& places) {
         if (places.empty()) return;
         const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D> parts(type, mesh_->local<D>(points_, e));
-        const double scale = VALID / parts.doubt();
+        const QuadraticParts<D, R> parts(type, mesh_->local<D, R>(points_, e));
+        const double scale = type.doubt / parts.doubt();
         if (!(scale < INFINITY)) return;
         for (int k = 0; k < type.nodes; ++k) {
             neighbours_.push_back(load<D>(points_ + static_cast<std::int64_t>(mesh_->nodes_of(e)[k]) * D) - origin_);
             radius_ = std::max(radius_, std::sqrt(norm2(neighbours_.back())));
         }
-        std::array<double, MOST_QUADRATIC_NODES> share{};
+        std::array<double, R::NODES> share{};
         share[node] = 1.0;
         const auto gradients = parts.gradients(share);
         for (const Sum* place : places) {

@@ -1,4 +1,4 @@
-// The linear programme of the paper for one node of elements of second order: each Bezier coefficient of their Jacobian
+// The linear programme of the paper for one node of curved elements: each Bezier coefficient of their Jacobian
 // determinants is affine in it, also where nodes on the edges of a corner go along with that. Where its optimum is
 // positive, that is a certificate for all of these elements.
 #pragma once
@@ -12,7 +12,7 @@ namespace meshfix {
 
 // What a sweep does: nodes whose elements have a coefficient below the goal, relative to the size, are visited one after the
 // other. `tied`: nodes of edges and faces go along with the corners that they are means of.
-template <int D>
+template <int D, class R>
 class QuadraticSweep {
    public:
     QuadraticSweep(const QuadraticMesh& mesh, double* points, const double* sizes, const std::uint8_t* free, QuadraticReach reach,
@@ -30,7 +30,7 @@ class QuadraticSweep {
     // The elements that change when a node moves by x, and by how much of that their nodes do.
     struct Touched {
         std::int32_t element;
-        std::array<double, MOST_QUADRATIC_NODES> share;
+        std::array<double, R::NODES> share;
     };
 
     bool relocate(std::int32_t v) {
@@ -41,13 +41,13 @@ class QuadraticSweep {
         double radius = 0.0, smallest = INFINITY;
         for (const Touched& one : touched_) {
             const QuadraticType& type = mesh_->type(one.element);
-            QuadraticNodes<D> nodes;
+            QuadraticNodes<D, R> nodes;
             for (int k = 0; k < type.nodes; ++k) {
                 nodes[k] = load<D>(points_ + static_cast<std::int64_t>(mesh_->nodes_of(one.element)[k]) * D) - here;
                 neighbours_.push_back(nodes[k]);
                 radius = std::max(radius, std::sqrt(norm2(nodes[k])));
             }
-            const QuadraticParts<D> parts(type, nodes);
+            const QuadraticParts<D, R> parts(type, nodes);
             const auto gradients = parts.gradients(one.share);
             const double scale = 1.0 / sizes_[one.element];
             double longest2 = 0.0;
@@ -90,9 +90,10 @@ class QuadraticSweep {
             for (int k = type.corners; k < type.nodes; ++k) {
                 const auto& between = type.between[k];
                 const std::int32_t node = mesh_->nodes_of(e)[k];
-                if (!free_[node] || std::find(between.begin(), between.end(), here) == between.end()) continue;
+                const auto share = std::find_if(between.begin(), between.end(), [here](const Share& one) { return one.of == here; });
+                if (!free_[node] || share == between.end()) continue;
                 const bool known = std::any_of(moving_.begin(), moving_.end(), [node](const auto& one) { return one.first == node; });
-                if (!known) moving_.emplace_back(node, 1.0 / static_cast<double>(between.size()));
+                if (!known) moving_.emplace_back(node, share->weight);
             }
         }
     }

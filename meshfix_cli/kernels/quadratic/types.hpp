@@ -1,8 +1,8 @@
-// Elements of second order as products of simplices: their control points, the differences of these, and where products
+// Curved elements as products of simplices: their control points, the differences of these, and where products
 // of differences go among the Bezier coefficients of the Jacobian determinant.
 //
 // A type is a product of simplices (factors): a hexahedron of three lines, a wedge of a triangle and a line. The position is a
-// polynomial of degree 2 in each factor, its derivative along a factor of degree 1 in that, so det J is one of degree D n - 1
+// polynomial of degree p in each factor, its derivative along a factor of degree p - 1 in that, so det J is one of degree D p - n
 // in a factor of dimension n where D is that of the element. Basis functions are scaled, so that products only add up: a
 // coefficient times the multinomial of its index is that of a monomial in barycentric coordinates.
 //
@@ -14,54 +14,17 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <deque>
 #include <map>
+#include <mutex>
+#include <numeric>
 #include <vector>
 
+#include "common/tolerances.hpp"
+#include "quadratic/inverse.hpp"
+#include "quadratic/shapes.hpp"
+
 namespace meshfix {
-
-constexpr int MOST_QUADRATIC_NODES = 27, MOST_QUADRATIC_COEFFICIENTS = 216, MOST_DIFFERENCES = 18, MOST_NORMALS = 80;
-
-// What the kernels are told of a type: the nodes as means of corners, in VTK's order, corners first.
-struct QuadraticShape {
-    int dimension;
-    std::vector<int> factors;               // their dimensions
-    std::vector<std::vector<int>> between;  // the corners whose mean each node is in the straight element
-    double weight;                          // of scaled Jacobians
-    double integral;                        // of a polynomial whose coefficients are 1
-};
-
-// The order of mesh/elements.py, SECOND_ORDER; a test compares the two.
-inline const std::vector<QuadraticShape>& quadratic_shapes() {
-    using Rows = std::vector<std::vector<int>>;
-    static const auto joined = [](int corners, const Rows& more) {
-        Rows rows;
-        for (int i = 0; i < corners; ++i) rows.push_back({i});
-        rows.insert(rows.end(), more.begin(), more.end());
-        return rows;
-    };
-    static const Rows quad{{0, 1}, {1, 2}, {2, 3}, {3, 0}};
-    static const Rows wedge{{0, 1}, {1, 2}, {2, 0}, {3, 4}, {4, 5}, {5, 3}, {0, 3}, {1, 4}, {2, 5}};
-    static const Rows hexahedron{{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
-    static const auto with = [](Rows rows, const Rows& more) {
-        rows.insert(rows.end(), more.begin(), more.end());
-        return rows;
-    };
-    static const double triangle = 1.1547005383792517, tetrahedron = 1.4142135623730951;
-    static const std::vector<QuadraticShape> shapes{
-        {2, {2}, joined(3, {{0, 1}, {1, 2}, {2, 0}}), triangle, 1.0 / 2},
-        {2, {1, 1}, joined(4, quad), 1.0, 1.0},
-        {2, {1, 1}, joined(4, with(quad, {{0, 1, 2, 3}})), 1.0, 1.0},
-        {3, {3}, joined(4, {{0, 1}, {1, 2}, {2, 0}, {0, 3}, {1, 3}, {2, 3}}), tetrahedron, 1.0 / 6},
-        {3, {2, 1}, joined(6, wedge), triangle, 1.0 / 2},
-        {3, {2, 1}, joined(6, with(wedge, {{0, 1, 4, 3}, {1, 2, 5, 4}, {2, 0, 3, 5}})), triangle, 1.0 / 2},
-        {3, {1, 1, 1}, joined(8, hexahedron), 1.0, 1.0},
-        {3, {1, 1, 1},
-         joined(8, with(hexahedron, {{0, 4, 7, 3}, {1, 2, 6, 5}, {0, 1, 5, 4}, {3, 7, 6, 2}, {0, 3, 2, 1}, {4, 5, 6, 7},
-                                     {0, 1, 2, 3, 4, 5, 6, 7}})),
-         1.0, 1.0},
-    };
-    return shapes;
-}
 
 // A weighted sum of things by their numbers.
 struct Share {
@@ -75,26 +38,36 @@ class QuadraticType {
    public:
     using Index = std::vector<int>;  // exponents of the barycentric coordinates of all factors, one factor behind the other
 
-    int dimension, nodes, corners = 0, controls, coefficients, normals = 0;
-    double weight, integral;
+    int dimension, order, nodes, corners = 1, controls, coefficients, normals = 0;
+    double weight;                               // of scaled Jacobians
+    double integral = 1.0;                       // of a polynomial whose coefficients are 1
+    double doubt = VALID;                        // what rounding leaves in doubt of coefficients
     std::vector<int> factors;                    // their dimensions
     std::vector<Sum> control_of_nodes;          // each control point as a sum of nodes
     std::array<std::vector<Sum>, 3> difference;  // along each direction: sums of control points, scaled
-    std::vector<std::vector<int>> between;
+    std::array<std::vector<double>, 3> share2;   // for each what its squared length counts: of more than second order that unscaled
+    std::vector<Sum> between;                    // where each node is in the straight element
+    std::vector<std::vector<std::vector<int>>> edges_at;  // for each corner its edges: the nodes from the nearest to the other end
     std::vector<int> normal_of;                  // of differences along the second and third direction, 3-D
     std::vector<int> coefficient_of;             // of a difference along the first direction and a normal, or a second difference
     std::vector<double> unscaled;                // what a scaled coefficient is multiplied by
     std::vector<int> corner_coefficient;         // the coefficient that is det J at each corner
-    std::vector<std::uint32_t> depends;          // for each coefficient the nodes that it depends on, as bits
+    std::vector<NodeSet> depends;                // for each coefficient the nodes that it depends on
     std::vector<std::array<Sum, 3>> at_node;     // for each node the derivative along each direction: sums of differences
     std::vector<std::array<std::vector<Sum>, 2>> halves;   // the control points of both halves, for each way to halve
     std::vector<std::array<int, 2>> cut;                   // the barycentric coordinates of both ends of the edge that is halved so
 
     explicit QuadraticType(const QuadraticShape& shape)
-        : dimension(shape.dimension), nodes(static_cast<int>(shape.between.size())), weight(shape.weight),
-          integral(shape.integral), factors(shape.factors), between(shape.between) {
-        for (const auto& corner : between) corners += corner.size() == 1;
-        find_controls();
+        : dimension(shape.dimension), order(shape.order), nodes(static_cast<int>(std::max(shape.between.size(), shape.places.size()))),
+          weight(shape.weight), factors(shape.factors) {
+        for (const int n : factors) {
+            corners *= n + 1;
+            integral /= factorial(n);
+        }
+        find_corners();
+        find_places(shape);
+        find_edges();
+        find_controls(shape);
         find_differences();
         find_products();
         find_dependence();
@@ -102,27 +75,40 @@ class QuadraticType {
         find_halves();
     }
 
-    // A place in an element: det J there as a sum of coefficients, and the nodes that it depends on, as bits.
+    // A place in an element: det J there as a sum of coefficients, and the nodes that it depends on.
     struct Place {
         Sum value;
-        std::uint32_t depends = 0;
+        NodeSet depends{};
     };
 
     // The places of a lattice with so many steps along each edge.
     std::vector<Place> lattice(int steps) const {
         std::vector<Place> found;
-        for (const Index& at : indices(std::vector<int>(factors.size(), steps))) {
+        for (const Index& step : indices(std::vector<int>(factors.size(), steps))) {
+            const Point at = shares(step, steps);
             Place place;
             for (const auto& [index, i] : coefficient_)
-                if (const double weight = monomial(index, at, steps); weight != 0.0) place.value.push_back({i, multinomial(index) * weight});
-            for (int direction = 0; direction < dimension; ++direction) place.depends |= nodes_of(derivative(direction, at, steps), direction);
+                if (const double weight = monomial(index, at); weight != 0.0) place.value.push_back({i, multinomial(index) * weight});
+            for (int direction = 0; direction < dimension; ++direction)
+                place.depends = place.depends | nodes_of(derivative(direction, at), direction);
             found.push_back(place);
         }
         return found;
     }
 
+    // The same of one that has nodes, and places between them, where proofs are looked for.
+    const std::vector<Place>& places() const {
+        std::call_once(placed_, [this] { places_ = lattice(2 * order); });
+        return places_;
+    }
+
    private:
+    using Point = std::vector<double>;  // barycentric coordinates in all factors, one factor behind the other
+
     std::map<Index, int> control_, coefficient_;
+    std::vector<Point> place_;  // of each node
+    mutable std::once_flag placed_;
+    mutable std::vector<Place> places_;
     std::array<std::vector<Index>, 3> difference_index_;
     std::vector<Index> corner_index_;
 
@@ -209,20 +195,87 @@ class QuadraticType {
         return index;
     }
 
-    void find_controls() {
-        find_corners();
-        for (const Index& index : indices(std::vector<int>(factors.size(), 2))) control_.emplace(index, static_cast<int>(control_.size()));
+    static Point shares(const Index& step, int steps) {
+        Point at;
+        for (const int one : step) at.push_back(static_cast<double>(one) / steps);
+        return at;
+    }
+
+    // Where the nodes are, in barycentric coordinates and as means of corners.
+    void find_places(const QuadraticShape& shape) {
+        place_ = shape.places;
+        for (const auto& mean_of : shape.between) {
+            place_.push_back(shares(index_of(mean_of), 2));
+            between.emplace_back();
+            for (const int corner : mean_of) between.back().push_back({corner, 1.0 / static_cast<double>(mean_of.size())});
+        }
+        for (const Point& at : shape.places) {
+            between.emplace_back();
+            for (int c = 0; c < corners; ++c)
+                if (const double share = monomial(corner_index_[c], at); share != 0.0) between.back().push_back({c, share});
+        }
+    }
+
+    void find_edges() {
+        const auto share_of = [&](int node, int corner) {
+            for (const Share& one : between[node])
+                if (one.of == corner) return one.weight;
+            return 0.0;
+        };
+        edges_at.resize(corners);
+        for (int c = 0; c < corners; ++c) {
+            std::vector<int> ends;
+            for (int k = corners; k < nodes; ++k) {
+                if (between[k].size() != 2 || share_of(k, c) == 0.0) continue;
+                const int end = between[k][between[k][0].of == c].of;
+                const auto known = std::find(ends.begin(), ends.end(), end) - ends.begin();
+                if (known == static_cast<std::ptrdiff_t>(ends.size())) {
+                    ends.push_back(end);
+                    edges_at[c].push_back({end});
+                }
+                edges_at[c][known].push_back(k);
+            }
+            for (auto& edge : edges_at[c])
+                std::sort(edge.begin(), edge.end(), [&](int a, int b) { return share_of(a, c) > share_of(b, c); });
+        }
+    }
+
+    void find_controls(const QuadraticShape& shape) {
+        for (const Index& index : indices(std::vector<int>(factors.size(), order))) control_.emplace(index, static_cast<int>(control_.size()));
         controls = static_cast<int>(control_.size());
+        control_of_nodes.resize(controls);
+        if (order > 2) {
+            interpolate();
+            return;
+        }
         std::map<Index, int> node_at;
-        for (int i = 0; i < nodes; ++i) node_at[index_of(between[i])] = i;
+        for (int i = 0; i < nodes; ++i) node_at[index_of(shape.between[i])] = i;
         // The position at each index: a node, or what those that there are make of it (serendipity).
         std::map<Index, Sum> position;
         for (const auto& [index, number] : control_) {
             const auto here = node_at.find(index);
             position[index] = here != node_at.end() ? Sum{{here->second, 1.0}} : in_the_middle(index, node_at);
         }
-        control_of_nodes.resize(controls);
         for (const auto& [index, number] : control_) control_of_nodes[number] = control_from(index, position);
+    }
+
+    // The control points of the polynomial that is at each node where that is: the inverse of the values of the basis there.
+    void interpolate() {
+        std::vector<double> values(static_cast<std::size_t>(nodes) * nodes);
+        for (int i = 0; i < nodes; ++i)
+            for (const auto& [index, number] : control_) values[static_cast<std::size_t>(i) * nodes + number] = multinomial(index) * monomial(index, place_[i]);
+        const std::vector<double> inverse = inverse_of(values, nodes);
+        double largest = 1.0;
+        for (int c = 0; c < nodes; ++c) {
+            double row = 0.0;
+            for (int i = 0; i < nodes; ++i) {
+                const double weight = inverse[static_cast<std::size_t>(c) * nodes + i];
+                if (std::fabs(weight) > ROUNDED) control_of_nodes[c].push_back({i, weight});
+                row += std::fabs(weight);
+            }
+            largest = std::max(largest, row);
+        }
+        doubt = VALID * largest;  // as much as control points are farther off than nodes
     }
 
     // The middle of a face or of the whole whose nodes are those of its edges: the sum of their edges less that of the corners.
@@ -239,7 +292,7 @@ class QuadraticType {
         for (const auto& [where, node] : node_at) {
             if (between[node].size() != 2) continue;
             const auto is_around = [&](int c) { return std::find(around.begin(), around.end(), c) != around.end(); };
-            if (is_around(between[node][0]) && is_around(between[node][1])) found.push_back({node, of_edges});
+            if (is_around(between[node][0].of) && is_around(between[node][1].of)) found.push_back({node, of_edges});
         }
         return found;
     }
@@ -278,16 +331,17 @@ class QuadraticType {
         return found;
     }
 
-    // The derivative of degree 2 is twice the difference of two control points, scaled by its multinomial.
+    // The derivative of degree p is p times the difference of two control points, scaled by its multinomial.
     void find_differences() {
         std::size_t at = 0;
         int direction = 0;
         for (std::size_t f = 0; f < factors.size(); ++f) {
-            std::vector<int> degrees(factors.size(), 2);
-            degrees[f] = 1;
+            std::vector<int> degrees(factors.size(), order);
+            degrees[f] = order - 1;
             for (int j = 1; j <= factors[f]; ++j, ++direction) {
                 for (const Index& index : indices(degrees)) {
-                    const double scale = 2.0 * multinomial(index);
+                    const double scale = order * multinomial(index);
+                    share2[direction].push_back(order > 2 ? 1.0 / (multinomial(index) * multinomial(index)) : 1.0);
                     const int first = static_cast<int>(at);
                     difference[direction].push_back({{control_.at(plus(index, first + j)), scale}, {control_.at(plus(index, first)), -scale}});
                     difference_index_[direction].push_back(index);
@@ -327,67 +381,71 @@ class QuadraticType {
             }
     }
 
-    std::uint32_t nodes_of(const Sum& controls_sum) const {
-        std::uint32_t bits = 0;
+    NodeSet nodes_of(const Sum& controls_sum) const {
+        NodeSet found;
         for (const Share& control : controls_sum)
-            for (const Share& node : control_of_nodes[control.of]) bits |= 1u << node.of;
-        return bits;
+            for (const Share& node : control_of_nodes[control.of]) found.add(node.of);
+        return found;
     }
 
     void find_dependence() {
-        depends.assign(coefficients, 0);
-        std::vector<std::uint32_t> rest;
+        depends.resize(coefficients);
+        std::array<std::vector<NodeSet>, 3> on;
+        for (int direction = 0; direction < dimension; ++direction)
+            for (const Sum& one : difference[direction]) on[direction].push_back(nodes_of(one));
+        std::vector<NodeSet> rest = on[1];
         if (dimension == 3) {
-            rest.assign(normals, 0);
-            for (std::size_t q = 0; q < difference[1].size(); ++q)
-                for (std::size_t r = 0; r < difference[2].size(); ++r)
-                    rest[normal_of[q * difference[2].size() + r]] |= nodes_of(difference[1][q]) | nodes_of(difference[2][r]);
-        } else {
-            for (const Sum& q : difference[1]) rest.push_back(nodes_of(q));
+            rest.assign(normals, {});
+            const int* at = normal_of.data();
+            for (const NodeSet& q : on[1])
+                for (const NodeSet& r : on[2]) {
+                    rest[*at] = rest[*at] | q | r;
+                    ++at;
+                }
         }
-        for (std::size_t p = 0; p < difference[0].size(); ++p)
-            for (std::size_t k = 0; k < rest.size(); ++k)
-                depends[coefficient_of[p * rest.size() + k]] |= nodes_of(difference[0][p]) | rest[k];
+        const int* to = coefficient_of.data();
+        for (const NodeSet& p : on[0])
+            for (const NodeSet& k : rest) {
+                depends[*to] = depends[*to] | p | k;
+                ++to;
+            }
     }
 
-    // Of the barycentric coordinates at / steps.
-    static double monomial(const Index& exponent, const Index& at, int steps) {
+    static double monomial(const Index& exponent, const Point& at) {
         double value = 1.0;
         for (std::size_t k = 0; k < at.size(); ++k)
-            for (int e = 0; e < exponent[k]; ++e) value *= static_cast<double>(at[k]) / steps;
+            for (int e = 0; e < exponent[k]; ++e) value *= at[k];
         return value;
     }
 
     // A derivative of the position as a sum of differences.
-    Sum derivative(int direction, const Index& at, int steps) const {
+    Sum derivative(int direction, const Point& at) const {
         Sum found;
         for (std::size_t p = 0; p < difference[direction].size(); ++p)
-            if (const double value = monomial(difference_index_[direction][p], at, steps); value != 0.0)
+            if (const double value = monomial(difference_index_[direction][p], at); value != 0.0)
                 found.push_back({static_cast<int>(p), value});
         return found;
     }
 
     // The nodes that a sum of differences depends on: those of control points may cancel each other.
-    std::uint32_t nodes_of(const Sum& differences, int direction) const {
-        constexpr double ROUNDING = 1e-12;
+    NodeSet nodes_of(const Sum& differences, int direction) const {
         std::map<int, double> weights;
         for (const Share& p : differences)
             for (const Share& control : difference[direction][p.of])
                 for (const Share& node : control_of_nodes[control.of]) weights[node.of] += p.weight * control.weight * node.weight;
-        std::uint32_t bits = 0;
+        NodeSet found;
         for (const auto& [node, weight] : weights)
-            if (std::fabs(weight) > ROUNDING) bits |= 1u << node;
-        return bits;
+            if (std::fabs(weight) > ROUNDED) found.add(node);
+        return found;
     }
 
     void find_at_nodes() {
         at_node.resize(nodes);
         for (int i = 0; i < nodes; ++i)
-            for (int direction = 0; direction < dimension; ++direction)
-                at_node[i][direction] = derivative(direction, index_of(between[i]), 2);
+            for (int direction = 0; direction < dimension; ++direction) at_node[i][direction] = derivative(direction, place_[i]);
     }
 
-    // The half beside the first end of an edge: there the other end is the middle. Blossoms of degree 2.
+    // The half beside the first end of an edge: there the other end is the middle. Blossoms.
     void find_halves() {
         std::size_t at = 0;
         for (const int n : factors) {
@@ -404,19 +462,20 @@ class QuadraticType {
     std::vector<Sum> half(int kept, int moved) const {
         std::vector<Sum> found(controls);
         for (const auto& [index, number] : control_) {
-            const Index without = plus(index, moved, -index[moved]);
-            Sum& here = found[number];
-            if (index[moved] == 0) here = {{number, 1.0}};
-            if (index[moved] == 1) here = {{number, 0.5}, {control_.at(plus(without, kept)), 0.5}};
-            if (index[moved] == 2)
-                here = {{number, 0.25}, {control_.at(plus(plus(without, kept), moved)), 0.5}, {control_.at(plus(without, kept, 2)), 0.25}};
+            const int all = index[moved];
+            for (int left = all; left >= 0; --left)
+                found[number].push_back({control_.at(plus(plus(index, moved, left - all), kept, all - left)),
+                                         std::ldexp(factorial(all) / (factorial(left) * factorial(all - left)), -all)});
         }
         return found;
     }
+
+    static constexpr double ROUNDED = 1e-9;  // weights below it are zero but for rounding
 };
 
-inline const QuadraticType& quadratic_type(std::uint8_t code) {
-    static const std::vector<QuadraticType> types(quadratic_shapes().begin(), quadratic_shapes().end());
+// Those of second order.
+inline const QuadraticType& quadratic_type(std::size_t code) {
+    static const std::deque<QuadraticType> types(quadratic_shapes().begin(), quadratic_shapes().end());
     return types[code];
 }
 

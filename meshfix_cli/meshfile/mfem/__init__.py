@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.meshfile.mfem.nodes import Linear, second_order
+from meshfix_cli.mesh.lagrange import HIGHEST, Kind, key_of
+from meshfix_cli.meshfile.mfem.nodes import Linear, higher_order, own_nodes
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import Int64, IntegerLines, Numbering, Runs, alike, integer_lines, rows, without
@@ -30,15 +31,17 @@ _SET = re.compile(rb'\s*"([^"\n]*)"')
 _SPACE = re.compile(
     rb"\s*FiniteElementSpace\s+FiniteElementCollection:\s*(\S+)\s+VDim:\s*([1-3])\s+Ordering:\s*([01])(?!\S)"
 )
-_SECOND = re.compile(r"Quadratic|H1(?:@[GU])?_\dD_P2")  # in which a node is where its value says
+# Spaces of functions whose values are those at the nodes. Of the first order those of all H1 are; U and T4: they are
+# evenly spaced, and else at the points of Gauss and Lobatto.
+_SHARED = re.compile(r"Linear|Quadratic|H1\w*?(?:@.)?_\dD_P1|H1(?:@(?P<even>U)|@G)?_\dD_P\d+")
+_APART = re.compile(r"L2_T(?:1|(?P<even>4))_\dD_P\d+")
 _ORDERS = {"Linear": 1, "Quadratic": 2, "Cubic": 3}
 _KINDS = {"NURBS": "a NURBS mesh", "NC": "a nonconforming mesh (NC)", "INLINE": "a mesh that is to be made (INLINE)"}
 _TYPES = {
     0: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8),
     6: ("wedge", 6), 7: ("pyramid", 5),
 }  # fmt: skip
-# Where each corner stands among the nodes that an element has for itself, whose first coordinate runs first.
-_BY_COORDINATES = {"quad": [0, 1, 3, 2], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
+_PYRAMID = 7
 _ATTRIBUTE = "mfem:attribute"
 
 
@@ -56,10 +59,14 @@ class _Mesh:
         Number of vertices.
     points : (k, d, 2) int64 or None
         Spans of the coordinates.
+    order : int
+        That of the nodes.
     apart : bool
         Each element has points of its own, as in periodic meshes.
-    second : list of (str, int64)
-        The types and the nodes (m, k) of elements and boundary where these are of second order.
+    lobatto : bool
+        They are at the points of Gauss and Lobatto.
+    nodes : list of (str, int64)
+        The types and the nodes (m, k) of elements and boundary where these are of higher order, and shared.
     end : int
     """
 
@@ -67,13 +74,15 @@ class _Mesh:
     sets: dict[str, dict[str, Int64]] = field(default_factory=dict)
     n: int = 0
     points: Spans | None = None
+    order: int = 1
     apart: bool = False
-    second: list[tuple[str, Int64]] = field(default_factory=list)
+    lobatto: bool = False
+    nodes: list[tuple[str, Int64]] = field(default_factory=list)
     end: int = 0
 
 
 def parse(data: bytes) -> Source:
-    """Read vertices, elements and boundary; nodes only where they are of first order, or of second and shared."""
+    """Read vertices, elements and boundary, and of any order the nodes that are where their values say."""
     text = without(data, _COMMENT, b"#")
     mesh = _sections(text)
     if mesh.points is None or "elements" not in mesh.tables:
@@ -153,20 +162,35 @@ def _read_nodes(mesh: _Mesh, text: bytes, at: int) -> int:
     if space is None:
         raise in_line(text, at, "the space of the nodes is not readable")
     name = space[1].decode("latin-1")
-    found = re.search(r"_P(\d{1,3})$", name)
-    order = int(found[1]) if found else _ORDERS.get(name, 1)
-    if order > 2:
-        raise ReadError(f"has curved elements (nodes of order {order}), which are not read yet")
-    mesh.apart = re.fullmatch(r"L2_T1_\dD_P1", name) is not None
-    if not (mesh.apart or name == "Linear" or re.fullmatch(r"H1\w*?(?:@.)?_\dD_P1", name) or _SECOND.fullmatch(name)):
+    mesh.order = _order_of(name)
+    kind = _SHARED.fullmatch(name) or _APART.fullmatch(name)
+    if kind is None:
         raise ReadError(f"has nodes in the space {name}, which are not read")
-    n, d = (int(_sizes(mesh)[0].sum()) if mesh.apart else mesh.n), int(space[2])
-    if order == 2:
-        mesh.second, n = second_order(mesh.n, _linear(mesh, "elements"), _linear(mesh, "boundary"))
+    if mesh.order > HIGHEST:
+        raise ReadError(f"has nodes of order {mesh.order}, which are not read")
+    mesh.apart, mesh.lobatto = kind.re is _APART, kind["even"] is None and mesh.order > 2
+    n, d = (_own(mesh) if mesh.apart else mesh.n), int(space[2])
+    if mesh.order > 1 and not mesh.apart:
+        cells = _linear(mesh, "elements"), _linear(mesh, "boundary")
+        mesh.nodes, n = higher_order(mesh.n, mesh.order, *cells, mesh.lobatto)
     by_component = space[3] == b"0"
     spans, at = rows(text, space.end(), d if by_component else n, n if by_component else d)
     mesh.points = spans.transpose(1, 0, 2) if by_component else spans
     return at
+
+
+def _order_of(name: str) -> int:
+    """Return the order of a space."""
+    found = re.search(r"_P(\d{1,3})$", name)
+    return int(found[1]) if found else _ORDERS.get(name, 1)
+
+
+def _own(mesh: _Mesh) -> int:
+    """Return how many nodes elements have that have each its own."""
+    types = _sizes(mesh)[1]
+    if (types == _PYRAMID).any():
+        raise ReadError("has nodes of its own for each pyramid, which are not read")
+    return sum(len(own_nodes(_TYPES[kind][0], mesh.order)) for kind in types.tolist())
 
 
 def _read_sets(text: bytes, at: int, count: int) -> tuple[dict[str, Int64], int]:
@@ -198,12 +222,16 @@ def _types(table: IntegerLines) -> Int64:
 
 
 def _add(runs: Runs, mesh: _Mesh) -> None:
-    """Add the elements and the facets of the boundary, with their nodes of second order where there are some."""
+    """Add the elements and the facets of the boundary, with their nodes of higher order where there are some."""
     cells = [(section, one) for section in ("elements", "boundary") for one in _linear(mesh, section)]
-    of_mesh = iter(mesh.second or [(one.key, one.vertices) for _, one in cells])
+    of_mesh = iter(mesh.nodes or [(one.key, one.vertices) for _, one in cells])
     for section, one in cells:
         key, nodes = next(of_mesh)
-        corners = _refuse_second if mesh.second else partial(_corners, mesh.tables[section], nodes.shape[1], one.rows)
+        corners = (
+            partial(_refuse_higher, mesh.order)
+            if mesh.nodes
+            else partial(_corners, mesh.tables[section], nodes.shape[1], one.rows)
+        )
         _put(runs, Cells(key, nodes, one.rows if section == "elements" else None), corners, mesh, section, one.rows)
 
 
@@ -232,17 +260,17 @@ def _put(runs: Runs, cells: Cells, corners: Callable[[], Places], mesh: _Mesh, s
 
 def _add_apart(runs: Runs, mesh: _Mesh) -> NDArray[np.bool_]:
     """Add the elements, which have points of their own; return which of these (n,) are on the boundary."""
-    table, (sizes, types) = mesh.tables["elements"], _sizes(mesh)
+    table, (_, types) = mesh.tables["elements"], _sizes(mesh)
+    sizes = np.array([len(own_nodes(_TYPES[kind][0], mesh.order)) for kind in types.tolist()], dtype=np.int64)
     first = np.cumsum(sizes) - sizes
     outside = _on_boundary(mesh)
     held = np.zeros(int(sizes.sum()), dtype=bool)
     for here in alike(types):
         key, size = _TYPES[int(types[here[0]])]
-        if key == "pyramid":
-            raise ReadError("has nodes of its own for each pyramid, which are not read")
-        points = first[here][:, None] + _BY_COORDINATES.get(key, list(range(size)))
-        _put(runs, Cells(key, points, here), _refuse, mesh, "elements", here)
-        held[points] = np.isin(table.integers(2, 2 + size, here), outside)
+        points = first[here][:, None] + own_nodes(key, mesh.order)
+        name = key if mesh.order == 1 else key_of(Kind(key, mesh.order, True, mesh.lobatto))
+        _put(runs, Cells(name, points, here), _refuse, mesh, "elements", here)
+        held[points[:, :size]] = np.isin(table.integers(2, 2 + size, here), outside)
     return held
 
 
@@ -259,8 +287,10 @@ def _refuse() -> Places:
     raise ReadError("has nodes of its own for each element, which would be those of others if it were renumbered")
 
 
-def _refuse_second() -> Places:
-    raise ReadError("has nodes of order 2, which are told apart by the order of its elements and of their vertices")
+def _refuse_higher(order: int) -> Places:
+    raise ReadError(
+        f"has nodes of order {order}, which are told apart by the order of its elements and of their vertices"
+    )
 
 
 def _corners(table: IntegerLines, size: int, here: Int64) -> Places:

@@ -267,8 +267,19 @@ def relocate(
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
-def exclusive(points: Float64, mesh: Connectivity, movable: NDArray[np.bool_], vertices: Int32, threads: int) -> Int32:
-    """Simplices of which some of these vertices are the only free ones, and no position makes all of them positive."""
+def exclusive(
+    points: Float64,
+    mesh: Connectivity,
+    movable: NDArray[np.bool_],
+    vertices: Int32,
+    threads: int,
+    freedom: Freedom | None = None,
+) -> tuple[Int32, Int32]:
+    """Simplices of which some of these vertices are the only free ones, and no position makes all of them positive.
+
+    Behind these such that no place in what the vertex slides in makes positive, each by itself. Vertices that slide are
+    at `points` where they began.
+    """
 
 def receive(
     points: Float64, states: NDArray[np.uint8], mesh: Connectivity, vertices: Int32, positions: Float64

@@ -75,7 +75,7 @@ def held_back(document: Document, after: Mesh, feature_angle: float) -> Iterator
     if count:
         stay = counted(count, "vertex of the boundary does", "vertices of the boundary do")
         yield f"{stay} not slide: the file fixes them or pairs them with others, as where it is periodic"
-    if mesh.freedom.shapes is None or mesh.surface is not None:
+    if mesh.freedom.shapes is None or mesh.freedom.shapes.folds or mesh.surface is not None:  # folds feign edges
         return
     inverted = after.judged().check(after.along_curve(after.points), 1)[0]
     bound = np.append(mesh.along_curve(~mesh.movable) | (mesh.freedom.degrees == 1), False)

@@ -85,6 +85,9 @@ def test_places_on_curves_and_surfaces(make: type, random: np.random.Generator) 
         if not one.movable[v] or one.check()[0] == 0:
             continue
         best, found = best_on_shape(one, v), find_obstacles(one)
+        again = find_obstacles(one, threads=3)
+        assert np.array_equal(found.exclusive, again.exclusive)
+        assert np.array_equal(found.inverted, again.inverted)
         mine = np.flatnonzero((one.topology.simplices == v).any(axis=1))
         blamed = np.isin(mine, np.concatenate([found.exclusive, found.inverted])).any()
         assert blamed or best > -1e-3

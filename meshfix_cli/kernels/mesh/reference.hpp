@@ -134,7 +134,8 @@ class Reference {
         std::array<std::array<Vec<D>, 3>, 3> half{}, whole{};
         for (int i = 0; i <= directions_[shape]; ++i)
             for (int j = 0; j <= directions_[shape]; ++j) {
-                const Vec<D> from = place(at<D>(corners_, piece, i)), to = place(at<D>(corners_, piece, j)), way = at<D>(ways_, piece, i);
+                const Vec<D> from = place(at<D>(corners_, piece, i)), to = place(at<D>(corners_, piece, j));
+                const Vec<D> way = at<D>(ways_, piece, i);
                 const Vec<D> part = (0.5 * dot(way, to - from)) * way;
                 half[i][j] = directions_[shape] == 2 ? to - part : 0.5 * (to + from) + part;
             }

@@ -76,9 +76,10 @@ void exclude_along(const Star<D>& star, const std::vector<Affine<D>>& functions,
         if (norm2(slope) > LP_PINNED2 * norm2(f.gradient)) {
             along.push_back({value, slope});
             owners.push_back(ring.owners[i]);
-        } else if (value + HELD_FAR * star.radius * std::sqrt(norm2(slope)) <= HELD_IMPOSSIBLE * star.radius * std::sqrt(norm2(f.gradient))) {
-            found.alone.push_back(ring.owners[i]);
+            continue;
         }
+        const double most = value + HELD_FAR * star.radius * std::sqrt(norm2(slope));
+        if (most <= HELD_IMPOSSIBLE * star.radius * std::sqrt(norm2(f.gradient))) found.alone.push_back(ring.owners[i]);
     }
     if (along.empty()) return;
     LinearProgram<K> program;

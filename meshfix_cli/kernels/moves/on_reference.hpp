@@ -3,6 +3,7 @@
 // do not decide is halved. Source: G. Farin, "Curves and surfaces for CAGD", the convex hull property.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "mesh/star.hpp"
@@ -13,7 +14,7 @@ namespace meshfix {
 template <int D>
 class OnReference {
    public:
-    std::vector<bool> blamed;  // the functions that are not positive somewhere where no other was found to be so before
+    std::vector<bool> blamed;  // the functions by which places were excluded: these alone exclude all of them
 
     OnReference(const Star<D>& star, std::vector<Affine<D>> functions)
         : blamed(functions.size(), false), star_(star), functions_(std::move(functions)) {
@@ -27,13 +28,16 @@ class OnReference {
     // Whether at each place of the shape one of the functions is not positive; false also where that stays undecided.
     bool is_excluded() {
         const Directions<D>& here = star_.directions;
+        const auto to_local = [&](const Vec<D>& p) { return star_.to_local(p); };
         const auto skip = [&](const Vec<D>& low, const Vec<D>& high) { return is_box_excluded(low, high); };
-        return here.reference->template for_each_piece<D>(here.shape, star_.to_global(star_.position), skip, [&](std::int64_t piece) {
-            const auto to_local = [&](const Vec<D>& p) { return star_.to_local(p); };
+        const auto look = [&](std::int64_t piece) {
             products_ = here.reference->template products<D>(here.shape, piece, to_local);
             const Weights one{1.0, 0.0, 0.0}, other{0.0, 1.0, 0.0}, third{0.0, 0.0, 1.0};
-            return here.count == 2 ? is_part_excluded<3>({one, other, third}, HELD_DEPTH) : is_part_excluded<2>({one, other}, HELD_DEPTH);
-        });
+            if (here.count == 2) return is_part_excluded<3>({one, other, third}, HELD_DEPTH);
+            return is_part_excluded<2>({one, other}, HELD_DEPTH);
+        };
+        const Vec<D> from = star_.to_global(star_.position);
+        return here.reference->template for_each_piece<D>(here.shape, from, skip, look);
     }
 
    private:

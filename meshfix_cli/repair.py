@@ -162,7 +162,10 @@ class Method:
     curving: Curving = "hold"
 
     def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
-        """Return a document in which vertices may slide, if they are to; `reference`: see `untangle.steps`."""
+        """Return a document in which vertices may slide, if they are to.
+
+        `reference`: see `untangle.steps`; not where the boundary was displaced, which says where it is to be.
+        """
         if document.mesh.surface is not None:
             return self.on_surface(document, reference)
         if self.slide == "none" or document.mesh.quadratic is not None:  # corners and nodes would part
@@ -310,7 +313,7 @@ class Judge:
             See `check`.
         """
         from meshfix_cli.quality.obstacles import find_obstacles
-        from meshfix_cli.quality.summary import ceiling, summarise
+        from meshfix_cli.quality.summary import ceiling, slid, summarise
         from meshfix_cli.report.facts import Report
 
         result = list(stages.values())[-1]
@@ -323,15 +326,21 @@ class Judge:
         summaries = {stage: summarise(stages[stage], metrics, self.threads, shapes) for stage in shown}
         if not (self.brief or command == "perturb"):
             start = next(iter(stages.values()))
-            before = start if reference is None else start.with_vertices(reference)
+            displaced = document.displaced is not None  # where the boundary is to be
+            before = start if reference is None or displaced else start.with_vertices(reference)
             if result.quadratic is not None:  # whose boundary does not slide
                 slides = {}
             elif result.surface is not None:
-                slides = self._slid(before, result) if command == "untangle" else {}
+                slides = slid(before, result, self.threads) if command == "untangle" else {}
             elif result.freedom is None:
                 slides = self._might_slide(document, result, summaries[shown[-1]], most)
             else:
-                slides = {**self._slid(before, result), "ceiling_without_sliding": ceiling(start.held, self.threads)}
+                slides = {
+                    **slid(before, result, self.threads),
+                    "ceiling_without_sliding": ceiling(start.held, self.threads),
+                }
+            if displaced and "shape" in slides:
+                slides["shape"]["displaced"] = True
             more["facts"] = {**(more.get("facts") or {}), **slides}
         if result.surface is not None and not self.brief:
             from meshfix_cli.quality.obstacles import crossings_of_surface
@@ -354,20 +363,6 @@ class Judge:
             requirements=self.requirements,
             **more,
         )
-
-    def _slid(self, before: Mesh, result: Mesh) -> dict[str, Any]:
-        """Return how many vertices slide, and what that made of the shape; `before`: where that was found."""
-        from meshfix_cli.quality.summary import change_of_shape
-
-        freedom = result.freedom
-        assert freedom is not None
-        moving = result.along_curve(result.movable)
-        flat, curved = freedom.degrees[moving & ~freedom.curved], freedom.degrees[moving & freedom.curved]
-        counts = {"lines": int((flat == 1).sum()), "planes": int((flat == 2).sum())}
-        if freedom.shapes is None:
-            return {"sliding": counts}
-        counts.update(curves=int((curved == 1).sum()), surfaces=int((curved == 2).sum()))
-        return {"sliding": counts, "shape": change_of_shape(before, result, self.threads)}
 
     def _might_slide(self, document: Document, result: Mesh, summary: Summary, most: float | None) -> dict[str, Any]:
         """Return what might be gained where no vertex slides and a ceiling limits the mesh."""
@@ -470,7 +465,8 @@ def _solved(
     """
     if document.mesh.quadratic is not None:
         return document, solve(document.mesh, reach), method.without_effect(document.mesh)
-    freed = method.freed(document, reference)
+    shape = reference if document.displaced is None else None
+    freed = method.freed(document, shape)
     outcome = solve(freed.mesh, reach)
     notes: tuple[str, ...] = ()
     rounded = 0  # elements that rounding has inverted: then less may be better also where it is valid
@@ -478,12 +474,16 @@ def _solved(
         left, rounded = outcome.records[-1].inverted, rounded or freed.first_valid_as_stored(outcome.after)[1]
         if not (left or rounded):
             break
-        other = replace(method, slide=slide).freed(document, reference)
+        other = replace(method, slide=slide).freed(document, shape)
         instead = solve(other.mesh, reach)
         if _rank(other, instead) < _rank(freed, outcome):
             freed, outcome = other, instead
             inverted, why = counted(left or rounded, "element", "elements"), "" if left else ", rounded for the file,"
             notes = (f"--slide {method.slide}{why} would leave {inverted} inverted, so that --slide {slide} is taken",)
+    if freed.mesh.freedom is not None:
+        from meshfix_cli.meshfile.sliding import held_back
+
+        notes += tuple(held_back(freed, outcome.after, method.feature_angle))
     return freed, outcome, notes
 
 

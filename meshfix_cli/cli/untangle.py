@@ -67,7 +67,7 @@ EXAMPLES = (
     "--displace",
     metavar="NAME",
     help="Move each point first by its vector in this point-data array, as a morph or a time step gives it; INPUT as "
-    "it was is the reference then, unless there is another.",
+    "it was is the reference then, unless there is another. With --slide the boundary keeps the shape that it has got.",
 )
 @under(REPORT, "--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells

@@ -5,6 +5,10 @@ from typing import overload
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli.kernels._obstacles import crossings as crossings
+from meshfix_cli.kernels._obstacles import crossings_and_folds as crossings_and_folds
+from meshfix_cli.kernels._obstacles import enclosing as enclosing
+from meshfix_cli.kernels._obstacles import exclusive as exclusive
 from meshfix_cli.kernels._quadratic import QUADRATIC_SHAPES as QUADRATIC_SHAPES
 from meshfix_cli.kernels._quadratic import QuadraticEnergy as QuadraticEnergy
 from meshfix_cli.kernels._quadratic import QuadraticMesh as QuadraticMesh
@@ -266,9 +270,6 @@ def relocate(
     measure smaller than `min_measure`, no vertex goes farther than `max_move` from `start`.
     """
 
-def exclusive(points: Float64, mesh: Connectivity, movable: NDArray[np.bool_], vertices: Int32, threads: int) -> Int32:
-    """Simplices of which some of these vertices are the only free ones, and no position makes all of them positive."""
-
 def receive(
     points: Float64, states: NDArray[np.uint8], mesh: Connectivity, vertices: Int32, positions: Float64
 ) -> None:
@@ -280,15 +281,6 @@ def linear_program(
     """Status (0 optimal, 1 degenerate, 2 failed), (x, t), dual weights of faces and box sides, axes of the box, pivots.
 
     heights: t is the smallest height over a face instead of the smallest determinant.
-    """
-
-def crossings(points: Float64, facets: Int32, threads: int) -> Int32:
-    """Pairs (k, 2) of facets (f, d), rows of vertices, that cross each other beyond doubt."""
-
-def crossings_and_folds(points: Float64, facets: Int32, shared: Uint8, threads: int) -> tuple[Int32, Int32]:
-    """Pairs that cross, and pairs (b, 2) of oriented facets that lie upon each other, their insides on the same side.
-
-    Those that are `shared` (f,) have their insides on both sides.
     """
 
 def embedding(
@@ -305,12 +297,6 @@ def embedding(
     With a freedom, the neighbours are those in its line or plane.
 
     Where elements are not all simplices, the neighbours are those of `Connectivity.edges`, with weights (e,).
-    """
-
-def enclosing(points: Float64, facets: Int32, parts: Int32, places: Float64, own: Int32, threads: int) -> Int32:
-    """For each place (q, d) that is inside its own part (q,) another that it is inside of; -1: there is none.
-
-    Oriented facets (f, d) close around a part; `parts` (f,) are those of the facets.
     """
 
 class Foldover:

@@ -41,6 +41,8 @@ class Freedom:
         Of each vertex that slides those in what it slides in, one vertex behind the other.
     shapes : Shapes or None
         The curves and surfaces, f - g of them; None: there are none.
+    stays : bool
+        Vertices on these begin where they are, and not where a reference has them.
     """
 
     frame: Numbers
@@ -49,6 +51,7 @@ class Freedom:
     offsets: Numbers
     neighbours: Numbers
     shapes: Shapes | None = None
+    stays: bool = False
 
     @cached_property
     def kernel(self) -> kernels.Freedom:
@@ -82,7 +85,7 @@ class Freedom:
         offsets, places = rows_of_part(self.offsets, vertices, own)
         neighbours = number[self.neighbours[places]]
         shapes = None if self.shapes is None else self.shapes.part(vertices, number, own)
-        return Freedom(self.frame[vertices], self.directions, self.axes, offsets, neighbours, shapes)
+        return Freedom(self.frame[vertices], self.directions, self.axes, offsets, neighbours, shapes, self.stays)
 
     def _along(self, vertices: NDArray[np.integer], ways: Array) -> tuple[Array, Array]:
         """Return the axes (v, d, d) of lines and planes, else 0, and the parts of ways (v, d) along them."""

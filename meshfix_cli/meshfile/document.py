@@ -30,6 +30,7 @@ FREE = "none"  # the name of no array of regions, by which interfaces are freed
 SAME_PLANE = 1e-6  # of one, by which the cosine between two planes may be less
 # Reasons to hold vertices that may slide all the same, where they are asked to.
 ON_CELLS = "on other cells of the file"
+BY_FILE = "by the file"
 CROWDED = "on edges of more than two elements"
 OF_CURVED = "of curved elements"
 HALFWAY = "between corners of other elements"
@@ -248,7 +249,7 @@ def build(
         solved = solved_of([_joined(run, copies) for run in source.cells])
     held = {ON_CELLS: _on_other_cells(solved, len(points))}
     if source.held is not None:
-        held["by the file"] = source.held
+        held[BY_FILE] = source.held
     named = {one: _fixed_by(source, one) for one in fix}
     held |= {f"by --fix {one}": mask for one, mask in named.items()}
     if fixed is not None:

@@ -30,6 +30,7 @@ _NAME = re.compile(rb"\s*\(\s*(\d{1,9})\s+([^\s()]+)\s+([^\s()]+)")
 _NODES, _CELLS, _FACES, _NAMES = (10, 2010, 3010), (12, 2012, 3012), (13, 2013, 3013), (39, 45)
 _REALS = {2010: "<f4", 3010: "<f8"}
 _INTERIOR = 2  # the kind of a zone of faces between cells
+_PERIODIC = (12, 8)  # those of faces that have shadows, and of these
 _SIZES = {2: "line", 3: "triangle", 4: "quad"}
 _MIXED = (0, 5)  # kinds of zones whose faces each tell their size
 _ZONE = "fluent:zone"
@@ -80,10 +81,11 @@ def parse(data: bytes) -> Source:
     coordinates = Places(begin, np.concatenate(ends) if ends else None, grid.nodes[0][1].dtype)
     numbers = [np.arange(first, first + len(places.begin)) for first, places in grid.nodes]
     points = Numbering(np.concatenate(numbers))
-    runs = _runs(grid, points)
+    runs, paired = _runs(grid, points)
+    held = None if paired.size == 0 else np.isin(np.arange(len(begin)), paired)
     return Source(
         coordinates.read(data), runs.cells, InPlace(data, coordinates, runs.corners), runs.arrays,
-        (_ZONE,) * bool(grid.cells), untold=("what else a case has, in sections of its own",),
+        (_ZONE,) * bool(grid.cells), held, untold=("what else a case has, in sections of its own",),
         oriented=False,  # programs do not agree about it
     )  # fmt: skip
 
@@ -211,8 +213,8 @@ def _slab(data: bytes, spans: Spans) -> Int64:
     return values
 
 
-def _runs(grid: _Grid, points: Numbering) -> Runs:
-    """Make cells of faces, and add the faces of zones that are not inside."""
+def _runs(grid: _Grid, points: Numbering) -> tuple[Runs, Int64]:
+    """Make cells of faces, and add the faces of zones that are not inside; with the points of periodic ones."""
     zones = [(zone.number, zone.kind, len(zone.sizes)) for zone in grid.faces]
     sizes = np.concatenate([zone.sizes for zone in grid.faces])
     cells = np.concatenate([zone.cells for zone in grid.faces]).astype(np.int64) - 1
@@ -232,12 +234,14 @@ def _runs(grid: _Grid, points: Numbering) -> Runs:
         runs.add(Cells(key, vertices, ids + 1), _not_turned, {_ZONE: labels})
         for number in np.unique(labels).tolist() if grid.cells else ():
             runs.put(_name(grid.names, number), run, np.flatnonzero(labels == number))
-    at = 0
+    at, paired = 0, [nodes[:0]]
     for number, kind, count in zones:
         if kind != _INTERIOR:
             _add_facets(runs, offsets[at : at + count + 1], nodes, _name(grid.names, number))
+        if kind in _PERIODIC:
+            paired.append(nodes[offsets[at] : offsets[at + count]])
         at += count
-    return runs
+    return runs, np.concatenate(paired)
 
 
 def _name(names: Mapping[int, str], number: int) -> str:

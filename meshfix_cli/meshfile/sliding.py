@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.elements import element_of
+from meshfix_cli.mesh.elements import counted, element_of
 from meshfix_cli.mesh.freedom import constraints_of, freedom_of
 from meshfix_cli.mesh.mesh import BETWEEN, ON_BOUNDARY
 from meshfix_cli.meshfile.coincident import first_of_each_place
-from meshfix_cli.meshfile.document import ON_CELLS, Document
+from meshfix_cli.meshfile.document import BY_FILE, ON_CELLS, Document
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.curved import Smooth
+    from meshfix_cli.mesh.mesh import Mesh
 
 Int64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
@@ -50,7 +52,8 @@ def slid(
     cells = CellsBeside(document, constraints.facets)
     labels = joint(len(constraints.facets), constraints.labels, cells.labels) if cells.facets else constraints.labels
     freedom = freedom_of(points, replace(constraints, labels=labels, lines=cells.lines), smooth)
-    held = cells.held | twins(document)
+    freedom = replace(freedom, stays=reference is None)
+    held = cells.held | twins(document, None if reference is None else topology.of_vertices(reference))
     if document.ties is not None:
         held = document.ties.with_corners(held)
     if reference is not None:
@@ -63,6 +66,31 @@ def slid(
     return replace(document, mesh=mesh.sliding(freedom, held))
 
 
+def held_back(document: Document, after: Mesh, feature_angle: float) -> Iterator[str]:
+    """Say what of the boundary did not slide, and whether that is what limits the mesh that came of it."""
+    mesh = document.mesh
+    assert mesh.freedom is not None
+    slides = mesh.topology.of_vertices(mesh.freedom.frame >= 0)
+    count = int((document.holds.get(BY_FILE, False) & slides & ~mesh.movable).sum())
+    if count:
+        stay = counted(count, "vertex of the boundary does", "vertices of the boundary do")
+        yield f"{stay} not slide: the file fixes them or pairs them with others, as where it is periodic"
+    if mesh.freedom.shapes is None or mesh.freedom.shapes.folds or mesh.surface is not None:  # folds feign edges
+        return
+    inverted = after.judged().check(after.along_curve(after.points), 1)[0]
+    bound = np.append(mesh.along_curve(~mesh.movable) | (mesh.freedom.degrees == 1), False)
+    at_features = np.zeros(mesh.topology.m, dtype=bool)
+    for block in mesh.topology.blocks:
+        at_features[block.rows] = bound[mesh.topology.number[block.vertices]].any(axis=1)
+    count = int(at_features[mesh.topology.connectivity.rows[inverted]].sum())
+    if count:
+        are = counted(count, "element that remains inverted is", "elements that remain inverted are")
+        yield (
+            f"{are} at edges or corners of the shape, where vertices slide along an edge or stay; with a larger "
+            f"--feature-angle than {feature_angle:g} there are fewer of these"
+        )
+
+
 def joint(count: int, *values: NDArray[np.integer]) -> Int64:
     """Return one number for each that some arrays (count,) have together; 0 where there are none."""
     code = np.zeros(count, dtype=np.int64)
@@ -73,9 +101,13 @@ def joint(count: int, *values: NDArray[np.integer]) -> Int64:
     return code
 
 
-def twins(document: Document) -> Mask:
-    """Mark the points (n,) of the boundary that lie at one place with others: what touches there may be in contact."""
-    first = first_of_each_place(document.mesh.points, np.flatnonzero(document.mesh.topology.boundary))
+def twins(document: Document, before: NDArray[np.float64] | None = None) -> Mask:
+    """Mark the points (n,) of the boundary that lie at one place with others: what touches there may be in contact.
+
+    Where they were (n, d) before the boundary moved, they did so as well: a tangle puts one upon another.
+    """
+    points = document.mesh.points if before is None else np.hstack([document.mesh.points, before])
+    first = first_of_each_place(points, np.flatnonzero(document.mesh.topology.boundary))
     copies = first != np.arange(len(first))
     copies[first[copies]] = True
     return copies

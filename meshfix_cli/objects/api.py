@@ -372,7 +372,7 @@ class Repairer:
             They are no numbers, of another shape, or not finite.
         """
         document = self._at(points_of(points))
-        freed = self._method.freed(document, self._places)
+        freed = self._method.freed(document)  # the boundary is to be where it has been moved
         reach = self._method.reach(document.mesh, self._threads)
         outcome = self._method.solve(freed.mesh, reach, self._threads, reference=self._places)
         self.outcome = replace(outcome, all_judged=not document.not_judged)

@@ -30,10 +30,11 @@ class Obstacles:
     Attributes
     ----------
     inverted : (k,) int32
-        Inverted simplices without a free vertex.
+        Inverted simplices without a free vertex, or of which the only one slides, and is inverted wherever that goes.
     exclusive : (e,) int32
         Simplices that have one and the same free vertex with some others of these, and no position of it makes all of
-        them positive: the dual of the linear programme of section 2 certifies it.
+        them positive: the dual of the linear programme of section 2 certifies it. Where that vertex slides, no place in
+        its line or plane, on its curve or surface does.
     crossing : (c, 2) int32
         Pairs of simplices of one part that have fixed facets which cross each other: the part overlaps itself, even
         where all of its simplices are positive. Each facet's first 16 crossings are looked for.
@@ -102,9 +103,10 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         wrong = mesh.judged(stuck).check(points, threads)[0]
         hopeless = np.concatenate([hopeless, stuck[wrong]])
     crossing, folding = _meeting(mesh, points, movable, threads)
+    together, alone = _exclusive(mesh, points, movable, corners[free == 1], threads)
     return Obstacles(
-        distinct(rows[hopeless]),
-        distinct(rows[_exclusive(mesh, points, movable, corners[free == 1], threads)]),
+        distinct(rows[np.concatenate([hopeless, alone])]),
+        distinct(rows[together]),
         crossing,
         folding,
         np.sort(rows[_overlapping(mesh, points, movable, inverted, threads)]),
@@ -182,14 +184,18 @@ def _common(one: NDArray[np.int32], other: NDArray[np.int32]) -> NDArray[np.int3
 
 def _exclusive(
     mesh: Mesh, points: Array, movable: NDArray[np.bool_], inverted: NDArray[np.int32], threads: int
-) -> NDArray[np.int32]:
-    """Return rows of the connectivity; some of these inverted corner simplices, of one free vertex, are theirs."""
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return rows of the connectivity; some of these inverted corner simplices, of one free vertex, are theirs.
+
+    Those that exclude each other, and those that are inverted for themselves wherever that slides.
+    """
     if not len(inverted):
-        return inverted
-    stars, anywhere = mesh.topology.stars(threads), mesh.along_curve(mesh.anywhere)
+        return inverted, inverted
+    stars = mesh.topology.stars(threads)
     corners = stars.simplices[inverted]
-    found = kernels.exclusive(points, stars, movable, distinct(corners[anywhere[corners]]), threads)
-    return mesh.topology.owners(found)
+    freedom = None if mesh.freedom is None else mesh.freedom.kernel
+    together, alone = kernels.exclusive(points, stars, movable, distinct(corners[movable[corners]]), threads, freedom)
+    return mesh.topology.owners(together), mesh.topology.owners(alone)
 
 
 def _distinct_pairs(pairs: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -338,6 +338,19 @@ def displacement(before: Mesh, after: Mesh) -> dict[str, float]:
     far = distances(before, after)
     moved = far[far > 0]
     return {"mean": float(moved.mean()) if len(moved) else 0.0, "largest": float(far.max()), "vertices": len(moved)}
+
+
+def slid(before: Mesh, result: Mesh, threads: int = 1) -> dict[str, Any]:
+    """Return how many vertices of a mesh slide, and what that made of the shape; `before`: where that was found."""
+    freedom = result.freedom
+    assert freedom is not None
+    moving = result.along_curve(result.movable)
+    flat, curved = freedom.degrees[moving & ~freedom.curved], freedom.degrees[moving & freedom.curved]
+    counts = {"lines": int((flat == 1).sum()), "planes": int((flat == 2).sum())}
+    if freedom.shapes is None:
+        return {"sliding": counts}
+    counts.update(curves=int((curved == 1).sum()), surfaces=int((curved == 2).sum()))
+    return {"sliding": counts, "shape": change_of_shape(before, result, threads)}
 
 
 def change_of_shape(before: Mesh, after: Mesh, threads: int = 1) -> dict[str, float]:

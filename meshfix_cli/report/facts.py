@@ -342,7 +342,10 @@ def _impossible(report: Report) -> Iterator[str]:
     if count := len(found.inverted):
         where = "without a free vertex" if report.mesh.topology.simplicial else "at corners without a free vertex"
         where = "wherever free nodes go" if curved else where
-        yield f"IMPOSSIBLE: {count:,} of them {where}: the fixed ones are wrong ({_some(report, found.inverted)})"
+        slides = ", or wherever the only free one slides" * (report.mesh.freedom is not None)
+        yield (
+            f"IMPOSSIBLE: {count:,} of them {where}{slides}: the fixed ones are wrong ({_some(report, found.inverted)})"
+        )
     if count := len(found.exclusive):  # at least two
         shared = "free nodes that they share go" if curved else "free vertex that they share goes"
         yield (

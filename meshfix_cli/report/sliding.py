@@ -38,9 +38,10 @@ def _changed(shape: Mapping[str, Any], mesh: Mesh) -> Iterator[str]:
         )
     if shape["folds"]:
         where = counted(shape["folds"], "edge" if solid else "vertex", "edges" if solid else "vertices")
+        before = "" if shape.get("displaced") else "; --reference names the mesh before"
         yield (
             f"the {what} itself is folded at {where} and is its own reference: vertices there stay, and others keep "
-            "to it as it is; --reference names the mesh before"
+            f"to it as it is{before}"
         )
 
 

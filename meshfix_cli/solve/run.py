@@ -412,7 +412,7 @@ class Run(Positions):
 
     def _slid_back(self) -> Array:
         """Return the points with those on surfaces and curves where they are in the reference, if that is in reach."""
-        if self.reference is None or self.freedom is None:
+        if self.reference is None or self.freedom is None or self.freedom.stays:
             return self.points
         near = np.linalg.norm(self.reference - self.first[0], axis=1) <= self.max_move
         return np.where((self.free & self.freedom.curved & near)[:, None], self.reference, self.points)

@@ -17,6 +17,7 @@ from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.elements import ELEMENTS, dimension_of
 from meshfix_cli.meshfile import cgns
 from meshfix_cli.meshfile.cgns.types import TYPES
+from meshfix_cli.meshfile.sliding import slid
 from meshfix_cli.meshfile.solved import turned
 from meshfix_cli.meshfile.source import Source
 
@@ -364,3 +365,48 @@ def test_blocks_cannot_be_renumbered(tmp_path: Path) -> None:
     assert source.layout is not None
     with pytest.raises(ReadError, match="between the points of a block, which cannot be renumbered"):
         source.layout.rewritten(source.points, source.points, turned(source.cells, {0: np.array([0])}))
+
+
+def cube_with_a_period(path: Path, *, of_faces: bool) -> Path:
+    """A cube whose sides at x = 0 and x = 3 belong together: a block of points, or hexahedra with faces in sections."""
+    points, shape = box((4, 4, 4)), (4, 4, 4)
+    low, high = (np.flatnonzero(points[:, 0] == x) for x in (0, 3))
+
+    def fill(file: Any) -> None:
+        parent = base(file, 3)
+        if not of_faces:
+            found = zone(parent, "zone", points, shape)
+            one = interface(found, "around", "zone", [[1, 1, 1], [1, 4, 4]], [[4, 1, 1], [4, 4, 4]], (1, 2, 3))
+            node(node(one, "GridConnectivityProperty", "GridConnectivityProperty_t"), "Periodic", "Periodic_t")
+            return
+        cells = np.array([
+            [a, a + 1, a + 5, a + 4, a + 16, a + 17, a + 21, a + 20]
+            for a in (i + 4 * j + 16 * k for k in range(3) for j in range(3) for i in range(3))
+        ])  # fmt: skip
+        found = zone(parent, "zone", points, cells=len(cells))
+        section(found, "all", 17, 1, cells + 1)
+        table = node(found, "ZoneGridConnectivity", "ZoneGridConnectivity_t")
+        start = len(cells) + 1
+        for name, side in (("low", low), ("high", high)):
+            quads = [[side[a], side[a + 1], side[a + 5], side[a + 4]] for a in (0, 1, 2, 4, 5, 6, 8, 9, 10)]
+            section(found, name, 7, start, np.array(quads) + 1)
+            one = node(table, f"of {name}", "GridConnectivity_t", "zone")
+            node(one, "GridConnectivityType", "GridConnectivityType_t", "Abutting1to1")
+            node(one, "GridLocation", "GridLocation_t", "FaceCenter")
+            numbers = np.arange(start, start + 9, dtype=np.int32)[:, None]
+            node(one, "PointList", "IndexArray_t", numbers)
+            node(node(one, "GridConnectivityProperty", "GridConnectivityProperty_t"), "Periodic", "Periodic_t")
+            start += 9
+
+    return _made(path, fill)
+
+
+@pytest.mark.parametrize("of_faces", [False, True])
+def test_points_with_a_period_do_not_slide(of_faces: bool, tmp_path: Path) -> None:
+    document = read(cube_with_a_period(tmp_path / "a.cgns", of_faces=of_faces))
+    assert len(document.mesh.points) == 64
+    moves = slid(document).mesh.movable
+    assert not moves[np.isin(document.mesh.points[:, 0], (0, 3))].any()
+    assert moves.sum() == 2 * 4 * 4  # along edges, in sides and inside
+    notes = untangle(document, slide="flat").report.notes
+    assert any("24 vertices of the boundary do not slide" in note for note in notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from meshfix_cli import read
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile.fluent import parse
 from meshfix_cli.meshfile.groups import groups_of
+from meshfix_cli.meshfile.sliding import slid
 
 POINTS = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0.5]])
 CELLS = np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
@@ -118,3 +120,24 @@ def test_the_dimension_may_stand_alone() -> None:
     np.testing.assert_array_equal(parse(short).points, POINTS)
     with pytest.raises(ReadError, match="does not tell how many coordinates they have"):
         parse(short.replace(b"(2 2)", b"(2 4)"))
+
+
+@pytest.mark.parametrize("kind", [b"c", b"8"])
+def test_points_of_periodic_faces_do_not_slide(kind: bytes, tmp_path: Path) -> None:
+    """Zones of faces that have shadows, and zones of these."""
+    points, cells = block()
+    plain = text(points, [("tetra", cells)], np.ones(len(cells), dtype=np.int64))
+    periodic, count = re.subn(rb"(\(13 \(4 \w+ \w+) 3 ", rb"\g<1> " + kind + b" ", plain)
+    assert count == 1
+    (tmp_path / "in.cas").write_bytes(plain)
+    (tmp_path / "periodic.cas").write_bytes(periodic)
+    free, document = read(tmp_path / "in.cas"), read(tmp_path / "periodic.cas")
+    assert free.source.held is None
+    assert document.source.held is not None
+    faces = [row for run in document.source.cells if run.type == "triangle" for row in run.vertices.tolist()]
+    half = len(faces) // 2
+    assert set(np.flatnonzero(document.source.held)) == {vertex for row in faces[:half] for vertex in row}
+    moves, all_move = slid(document).mesh.movable, slid(free).mesh.movable
+    assert not (moves & document.source.held).any()
+    np.testing.assert_array_equal(moves, all_move & ~document.source.held)
+    assert (all_move & document.source.held).any()

@@ -273,3 +273,28 @@ def read_stream(path: Path) -> None:
     from meshfix_cli.meshfile.recognise import Format
 
     parse(path.read_bytes(), Format("openfoam"))
+
+
+@pytest.mark.parametrize("kind", ["cyclic", "processor", "wedge", "empty", "wall"])
+def test_points_of_patches_that_are_paired_do_not_slide(kind: str, tmp_path: Path) -> None:
+    folder = tangled(tmp_path / "case", "text")
+    boundary = folder / "constant" / "polyMesh" / "boundary"
+    boundary.write_text(boundary.read_text().replace("type            patch", f"type            {kind}"))
+    document = read(folder)
+    (inlet,) = [
+        np.unique(run.vertices[rows])
+        for run, rows in zip(document.source.cells, document.source.arrays.cell_sets["inlet"], strict=True)
+        if len(rows)
+    ]
+    result = untangle(document, slide="flat", smooth="best")
+    notes = [note for note in result.report.notes if "periodic" in note]
+    moved = (result.points != document.source.points).any(axis=1)
+    if kind == "wall":
+        assert document.source.held is None
+        assert moved[inlet].any()
+        assert not notes
+    else:
+        assert document.source.held is not None
+        assert set(np.flatnonzero(document.source.held)) == set(inlet)
+        assert not moved[inlet].any()
+        assert len(notes) == 1

@@ -13,6 +13,7 @@ constexpr double VALID = 1e-14;
 constexpr double BEZIER_PLAIN = 2.0;
 constexpr int BEZIER_DEPTH = 60;    // halvings of a hexahedron: 20 in each direction, if it is bent in all
 constexpr int BEZIER_PARTS = 4096;  // of it that are looked at; what is not decided then is not valid
+constexpr int HELD_DEPTH = 8;       // halvings of a piece of a curve or surface on which a vertex has a place, or none
 constexpr int QUADRATIC_PARTS = 4096;  // the same of a curved element
 
 // Linear programme. All are relative to the largest number of their kind in the star.
@@ -23,6 +24,8 @@ constexpr double LP_PRICING = 1e-13;        // reduced cost that still counts as
 constexpr double LP_PIVOT = 1e-11;          // pivot element that still counts as positive
 constexpr double LP_BOX = 1.0;              // half width of the box that bounds the vertex, in star sizes
 constexpr double LP_IMPOSSIBLE = 1e-15;     // of the determinants: no smallest one that is larger is told from zero
+constexpr double HELD_IMPOSSIBLE = 1e-14;   // of the star's size: heights up to which a vertex that slides makes nothing valid
+constexpr double HELD_FAR = 100.0;          // star sizes: how far it is looked for a place in a line or plane
 constexpr double LP_PINCHED_SINE2 = 3e-4;     // sine squared, of one degree: below it smoothing tries the programme
 constexpr double LP_AXIS2 = 0.1;            // squared length, of the largest, at which a neighbour may set an axis
 constexpr int LP_BLAND_AFTER = 20;          // plus one per face: pivots before Bland's rule

@@ -127,6 +127,46 @@ class Reference {
         return 0.5 * (foot.point + sum);
     }
 
+    // The rounded piece as a quadratic polynomial of the weights w of its corners: the sum of w_i w_j P_ij, of which these are
+    // the P, symmetric. `place` gives positions in the coordinates that are wanted, axes and all but for a factor the same.
+    template <int D, class F>
+    std::array<std::array<Vec<D>, 3>, 3> products(std::int32_t shape, std::int64_t piece, const F& place) const {
+        std::array<std::array<Vec<D>, 3>, 3> half{}, whole{};
+        for (int i = 0; i <= directions_[shape]; ++i)
+            for (int j = 0; j <= directions_[shape]; ++j) {
+                const Vec<D> from = place(at<D>(corners_, piece, i)), to = place(at<D>(corners_, piece, j));
+                const Vec<D> way = at<D>(ways_, piece, i);
+                const Vec<D> part = (0.5 * dot(way, to - from)) * way;
+                half[i][j] = directions_[shape] == 2 ? to - part : 0.5 * (to + from) + part;
+            }
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j) whole[i][j] = 0.5 * (half[i][j] + half[j][i]);
+        return whole;
+    }
+
+    // Whether look(piece) is true of all pieces of a shape, those near p first, but for such in boxes that skip(low, high) is
+    // true of.
+    template <int D, class Skip, class F>
+    bool for_each_piece(std::int32_t shape, const Vec<D>& p, const Skip& skip, const F& look) const {
+        std::array<std::int32_t, 64> waiting;
+        int count = 0;
+        waiting[count++] = roots_[shape];
+        while (count > 0) {
+            const Node& node = nodes_[waiting[--count]];
+            if (skip(load<D>(node.low.data()), load<D>(node.high.data()))) continue;
+            if (node.right == 0) {
+                for (std::int32_t i = node.begin; i < node.end; ++i)
+                    if (!look(order_[i])) return false;
+                continue;
+            }
+            std::int32_t near = static_cast<std::int32_t>(&node - nodes_.data()) + 1, far = node.right;
+            if (distance2<D>(nodes_[far], p) < distance2<D>(nodes_[near], p)) std::swap(near, far);
+            waiting[count++] = far;
+            waiting[count++] = near;
+        }
+        return true;
+    }
+
     // The directions of a shape at a foot, orthonormal; one in a curve, two in a surface.
     template <int D>
     Edges<D> axes(std::int32_t shape, const Foot<D>& here) const {

@@ -49,14 +49,16 @@ auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8
 }
 
 auto exclusive_py(const Matrix<const double>& points, const PyConnectivity& self, const Vector<const bool>& movable,
-                  const Vector<const std::int32_t>& vertices, int threads) {
+                  const Vector<const std::int32_t>& vertices, int threads, const Freedom* freedom) {
     if (!self.has_stars) throw nb::value_error("the stars are not built");
     check_points(points, self);
+    check_freedom(freedom, self.mesh.n());
     const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
-    return to_numpy(with_dimension(self.dimension, [&](auto d) {
-        return exclusive_simplices<d>(self.mesh, stars_of(self.mesh), points.data(), mask, vertices.data(),
+    Excluded found = with_dimension(self.dimension, [&](auto d) {
+        return exclusive_simplices<d>(self.mesh, stars_of(self.mesh), freedom, points.data(), mask, vertices.data(),
                                       static_cast<std::int64_t>(vertices.shape(0)), threads);
-    }));
+    });
+    return std::make_pair(to_numpy(std::move(found.together)), to_numpy(std::move(found.alone)));
 }
 
 // Vertices that others moved: where one is elsewhere, its neighbours are due again.
@@ -288,7 +290,7 @@ void bind_moves(nb::module_& m) {
     m.def("receive", &receive_py, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a, "vertices"_a.noconvert(),
           "positions"_a.noconvert());
     m.def("exclusive", &exclusive_py, "points"_a.noconvert(), "mesh"_a, "movable"_a.noconvert(), "vertices"_a.noconvert(),
-          "threads"_a);
+          "threads"_a, "freedom"_a = nb::none());
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),

@@ -43,7 +43,7 @@ def parse(data: bytes) -> Source | None:
         runs = [(run, start) for zone, start in zip(zones, starts, strict=False) for run in zone.runs]
         cells = [_cells(run, start, len(zones) == 1) for run, start in runs]
         layout = hdf5.layout(root, data, "cgns", table, [run.corners or _nowhere for run, _ in runs])
-        shared = join(zones, copies, cells)
+        shared, paired = join(zones, copies, cells)
         rows = np.arange(len(copies)) if shared is None else shared[0]
         found = arrays(zones, rows)
         untold = tuple(_untold(zones))
@@ -58,7 +58,7 @@ def parse(data: bytes) -> Source | None:
         layout,
         lambda: found,
         (FAMILY,) if FAMILY in found.cell else (),
-        held=_held(found, len(points)),
+        held=_held(found, len(points), rows[paired]),
         untold=untold,
         notes=tuple(_notes(zones, rows, len(points))),
         oriented=not any(zone.structured for zone in zones),  # in blocks the indices may run either way
@@ -104,9 +104,13 @@ def _nowhere() -> Table:
     raise ReadError("has cells between the points of a block, which cannot be renumbered")
 
 
-def _held(found: Arrays, points: int) -> NDArray[np.bool_]:
-    """Mark the points of boundary conditions: they are on no boundary where a baffle's two sides are joined."""
+def _held(found: Arrays, points: int, paired: Int64) -> NDArray[np.bool_]:
+    """Mark the points of boundary conditions: they are on no boundary where a baffle's two sides are joined.
+
+    So are those that have a partner, as where the mesh is periodic.
+    """
     held = np.zeros(points, dtype=bool)
+    held[paired] = True
     for rows in found.point_sets.values():
         held[rows] = True
     return held

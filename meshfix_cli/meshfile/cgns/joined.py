@@ -1,7 +1,7 @@
 """Which points of zones are the same, and a layout in which each of them is written wherever it stands.
 
 Interfaces tell it where the file has them; else points on the boundaries of zones are one that have exactly equal
-coordinates. What an interface joins at different places, as one with a period, is two points.
+coordinates. What an interface joins at different places, as one with a period, is two points, which are held.
 
 Source: CGNS, "Standard Interface Data Structures", section 8.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from scipy.sparse.csgraph import connected_components
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.meshfile import hdf5
+from meshfix_cli.meshfile.cgns.sets import location, named_points
 from meshfix_cli.meshfile.cgns.types import Int64
 from meshfix_cli.meshfile.cgns.zones import Zone, child, children, grid, integers, text
 from meshfix_cli.meshfile.coincident import first_of_each_place
@@ -57,7 +58,7 @@ class Shared:
         return self.layout.rewritten(self.copies, np.where(moved, points[self.rows], self.copies), reversed_cells)
 
 
-def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells]) -> tuple[Int64, Int64] | None:
+def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells]) -> tuple[tuple[Int64, Int64] | None, Int64]:
     """Find the points of the mesh.
 
     Parameters
@@ -69,15 +70,17 @@ def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells]) -> tuple
 
     Returns
     -------
-    (k,) int64
-        The point of the mesh of each.
-    (n,) int64
-        For each point of the mesh the first of its copies.
+    joined : pair of (k,) int64 and (n,) int64, or None
+        The point of the mesh of each, and for each point of the mesh the first of its copies. None: there are no
+        copies.
+    paired : int64
+        Those of all zones that an interface joins to others elsewhere.
     """
     starts = np.cumsum([0, *(zone.points for zone in zones)]).tolist()
     found = [pair for i in range(len(zones)) for pair in _interfaces(zones, starts, i, points)]
-    told = [pair for pair in found if pair is not None]
+    told = [pair.near for pair in found if pair is not None]
     known = 0 < len(told) == len(found)
+    paired = np.concatenate([np.empty(0, np.int64), *(pair.apart.ravel() for pair in found if pair is not None)])
     for zone, start in zip(zones, starts, strict=False):
         if zone.structured:
             mine = points[start : start + zone.points].astype(np.float64)
@@ -86,11 +89,11 @@ def join(zones: Sequence[Zone], points: Points, cells: Sequence[Cells]) -> tuple
     if len(zones) > 1 and not known:
         labels = _at_one_place(zones, points, cells, labels)
     if (labels == np.arange(len(points))).all():
-        return None
+        return None, paired
     used = np.zeros(len(points), dtype=bool)
     for run in cells:
         used[run.vertices] = True
-    return joined(labels, used)
+    return joined(labels, used), paired
 
 
 def _united(pairs: Int64, n: int) -> Int64:
@@ -139,8 +142,15 @@ def _at_one_place(zones: Sequence[Zone], points: Points, cells: Sequence[Cells],
     return by_place(copies)[rows]
 
 
-def _interfaces(zones: Sequence[Zone], starts: Sequence[int], here: int, points: Points) -> Iterator[Int64 | None]:
-    """Give the pairs (2, k) of points at one place that the interfaces of a zone join; None: one names no points."""
+class _Pairs(NamedTuple):
+    """Points that an interface joins: those at one place (2, k), and others (2, a)."""
+
+    near: Int64
+    apart: Int64
+
+
+def _interfaces(zones: Sequence[Zone], starts: Sequence[int], here: int, points: Points) -> Iterator[_Pairs | None]:
+    """Give what the interfaces of a zone join; None: one names no points."""
     names = {zone.name: i for i, zone in enumerate(zones)}
     size = float(np.ptp(points, axis=0).max(initial=0.0)) if len(points) else 0.0
     for table in children(zones[here].group, "ZoneGridConnectivity_t").values():
@@ -149,20 +159,28 @@ def _interfaces(zones: Sequence[Zone], starts: Sequence[int], here: int, points:
             there = names.get(text(node).rpartition("/")[2])
             if there is None:
                 continue
+            periodic = _is_periodic(node)
+            if periodic and location(node) != "Vertex":  # the other side has an interface of its own
+                faces = named_points(zones[here], node, name) + starts[here]
+                yield _Pairs(np.empty((2, 0), dtype=np.int64), np.stack([faces, faces]))
+                continue
             rows = _matching(zones[here], zones[there], node, name)
             if rows is None:
                 yield None
                 continue
             pair = np.stack([rows[0] + starts[here], rows[1] + starts[there]])
-            apart = np.abs(points[pair[0]].astype(np.float64) - points[pair[1]]).max(axis=1, initial=0.0)
-            yield pair[:, apart <= NEAR * size]
+            far = np.abs(points[pair[0]].astype(np.float64) - points[pair[1]]).max(axis=1, initial=0.0)
+            near = (far <= NEAR * size) & (not periodic)
+            yield _Pairs(pair[:, near], pair[:, ~near])
+
+
+def _is_periodic(node: Any) -> bool:
+    property_ = child(node, "GridConnectivityProperty_t")
+    return property_ is not None and bool(children(property_, "Periodic_t"))
 
 
 def _matching(zone: Zone, donor: Zone, node: Any, name: str) -> Int64 | None:
     """Return the rows (2, k) of the points of an interface and of those of the other zone; None: it names no points."""
-    property_ = child(node, "GridConnectivityProperty_t")
-    if property_ is not None and children(property_, "Periodic_t"):
-        return np.empty((2, 0), dtype=np.int64)
     if hdf5.attribute(node, "label") == "GridConnectivity1to1_t":
         mine = integers(child(node, "IndexRange_t", "PointRange"))
         theirs = integers(child(node, "IndexRange_t", "PointRangeDonor"))
@@ -171,7 +189,7 @@ def _matching(zone: Zone, donor: Zone, node: Any, name: str) -> Int64 | None:
     kind = text(child(node, "GridConnectivityType_t")) or "Overset"
     if kind != "Abutting1to1":  # points of the one zone are within cells of the other
         return np.empty((2, 0), dtype=np.int64)
-    if (text(child(node, "GridLocation_t")) or "Vertex") != "Vertex":
+    if location(node) != "Vertex":
         return None
     ours = _listed(zone, integers(child(node, "IndexArray_t", "PointList")))
     others = _listed(donor, integers(child(node, "IndexArray_t", "PointListDonor")))

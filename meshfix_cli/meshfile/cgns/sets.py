@@ -44,7 +44,7 @@ def arrays(zones: Sequence[Zone], rows: Int64) -> Arrays:
                 for i in inside:
                     families[before + i][chosen[i]] = names[-1]
                 continue
-            mine = start + (_vertices(zone, chosen) if chosen else _points(zone, node, names[0]))
+            mine = start + named_points(zone, node, names[0])
             for name in names:
                 points[name] = np.union1d(points.get(name, mine[:0]), rows[mine])
         start, before = start + zone.points, before + len(zone.runs)
@@ -56,6 +56,12 @@ def arrays(zones: Sequence[Zone], rows: Int64) -> Arrays:
         cell[FAMILY] = [np.array([numbers.get(name, 0) for name in some.tolist()], np.int64) for some in families]
         groups = {name: [number, highest] for name, number in numbers.items() if name}
     return Arrays(cell=cell, groups=groups, point_sets=points, cell_sets=_sections(runs))
+
+
+def named_points(zone: Zone, node: Any, name: str) -> Int64:
+    """Return the rows of the points that a condition or an interface names, or of the cells and faces that it does."""
+    chosen = _elements(zone, node)
+    return _vertices(zone, chosen) if chosen else _points(zone, node, name)
 
 
 def _sections(runs: Sequence[Run]) -> dict[str, list[Int64]]:
@@ -76,7 +82,7 @@ def _elements(zone: Zone, node: Any) -> list[NDArray[np.bool_]]:
     for which in ("Element", "Point"):
         bounds = integers(child(node, "IndexRange_t", f"{which}Range"))
         listed = integers(child(node, "IndexArray_t", f"{which}List"))
-        of_cells = which == "Element" or (_location(node) != "Vertex" and not zone.structured)
+        of_cells = which == "Element" or (location(node) != "Vertex" and not zone.structured)
         if of_cells and bounds.size:
             return [(run.ids >= bounds.min()) & (run.ids <= bounds.max()) for run in zone.runs]
         if of_cells and listed.size:
@@ -89,7 +95,8 @@ def _vertices(zone: Zone, chosen: Sequence[NDArray[np.bool_]]) -> Int64:
     return np.unique(np.concatenate(found))
 
 
-def _location(node: Any) -> str:
+def location(node: Any) -> str:
+    """Return of what a node names the indices."""
     return text(child(node, "GridLocation_t")) or "Vertex"
 
 
@@ -101,9 +108,9 @@ def _points(zone: Zone, node: Any, name: str) -> Int64:
     if bounds.size not in (0, 2 * d) or listed.size % d:
         raise ReadError(f"is not a readable cgns file: the points of {name!r} have no indices of their zone")
     if not bounds.size:
-        return _around(zone, listed.reshape(-1, d), _location(node))
+        return _around(zone, listed.reshape(-1, d), location(node))
     ends = np.clip(np.sort(bounds.reshape(2, d), axis=0), 1, zone.shape)
-    return _around(zone, grid(ends[0], ends[1]), _location(node))
+    return _around(zone, grid(ends[0], ends[1]), location(node))
 
 
 def _around(zone: Zone, indices: Int64, location: str) -> Int64:

@@ -29,6 +29,10 @@ _ZONE = "openfoam:zone"
 _SIZES = {3: "triangle", 4: "quad"}
 _TIME = re.compile(r"\d+(\.\d*)?(e[+-]?\d+)?")
 _RANGE = re.compile(rb"\b(nFaces|startFace)\s+(\d{1,18})\s*;")
+_TYPE = re.compile(rb"\btype\s+(\w+)\s*;")
+# Types of patches whose points have partners: on the other half, in the mesh of another process, on the other side of a
+# mesh that is one cell thick.
+_MATCHED = frozenset(b"cyclic cyclicSlip nonuniformTransformCyclic processor processorCyclic empty wedge".split())
 
 
 def folder_of(path: Path) -> Path:
@@ -125,12 +129,20 @@ def _source(data: bytes, folder: Path) -> tuple[Source, InPlace]:
         for name, cells in zones:
             runs.put(name, len(runs.cells), np.flatnonzero(np.isin(ids, cells)))
         runs.add(Cells(kind, vertices, ids), _no_corners, {_ZONE: zone_of[ids]})
-    for name, some in (*_patches(folder), *_zones(folder, "faceZones")):
+    patches, held = list(_patches(folder)), np.zeros(len(coordinates.begin), dtype=bool)
+    for name, some in (*((name, some) for name, _, some in patches), *_zones(folder, "faceZones")):
         _add_facets(runs, faces, name, some)
+    for _, patch_type, some in patches:
+        if patch_type in _MATCHED:
+            held[faces.vertices[np.repeat(np.isin(np.arange(len(faces.owner)), some), np.diff(faces.offsets))]] = True
     point_sets = dict(_zones(folder, "pointZones"))
     layout = InPlace(data, coordinates, runs.corners)
     regions = (_ZONE,) * (len(zones) > 0)
-    return Source(coordinates.read(points.data), runs.cells, None, lambda: runs.arrays(point_sets), regions), layout
+    values = coordinates.read(points.data)
+    source = Source(
+        values, runs.cells, None, lambda: runs.arrays(point_sets), regions, held=held if held.any() else None
+    )
+    return source, layout
 
 
 def _faces(folder: Path, n: int) -> Faces:
@@ -155,13 +167,15 @@ def _faces(folder: Path, n: int) -> Faces:
     return Faces(offsets, vertices, owner, both_sides)
 
 
-def _patches(folder: Path) -> Iterator[tuple[str, Int64]]:
-    """Give the names and the faces of the parts of the boundary."""
+def _patches(folder: Path) -> Iterator[tuple[str, bytes, Int64]]:
+    """Give the names, the types and the faces of the parts of the boundary."""
     file = _read(folder, "boundary")
     for name, text, _ in file.blocks() if file else ():
         found = {key: int(number) for key, number in _RANGE.findall(text)}
         if len(found) == 2:
-            yield name, found[b"startFace"] + np.arange(min(found[b"nFaces"], len(file.data) if file else 0))
+            kind = _TYPE.search(text)
+            some = found[b"startFace"] + np.arange(min(found[b"nFaces"], len(file.data) if file else 0))
+            yield name, kind[1] if kind else b"", some
 
 
 def _zones(folder: Path, name: str) -> Iterator[tuple[str, Int64]]:

@@ -28,11 +28,12 @@ def exclusive(
     points: Float64,
     mesh: Connectivity,
     movable: NDArray[np.bool_],
+    hopeless: NDArray[np.bool_],
     vertices: Int32,
     threads: int,
     freedom: Freedom | None = None,
 ) -> tuple[Int32, Int32]:
-    """Simplices of which some of these vertices are the only free ones, and no position makes all of them positive.
+    """Simplices, but hopeless ones, whose only free vertex is one of these, and no position makes all of them positive.
 
     Behind these such that no place in what the vertex slides in makes positive, each by itself. Vertices that slide are
     at `points` where they began.

@@ -103,7 +103,7 @@ def find_obstacles(mesh: Mesh, threads: int = 1) -> Obstacles:
         wrong = mesh.judged(stuck).check(points, threads)[0]
         hopeless = np.concatenate([hopeless, stuck[wrong]])
     crossing, folding = _meeting(mesh, points, movable, threads)
-    together, alone = _exclusive(mesh, points, movable, corners[free == 1], threads)
+    together, alone = _exclusive(mesh, points, movable, corners[free == 1], hopeless, threads)
     return Obstacles(
         distinct(rows[np.concatenate([hopeless, alone])]),
         distinct(rows[together]),
@@ -183,18 +183,28 @@ def _common(one: NDArray[np.int32], other: NDArray[np.int32]) -> NDArray[np.int3
 
 
 def _exclusive(
-    mesh: Mesh, points: Array, movable: NDArray[np.bool_], inverted: NDArray[np.int32], threads: int
+    mesh: Mesh,
+    points: Array,
+    movable: NDArray[np.bool_],
+    inverted: NDArray[np.int32],
+    hopeless: NDArray[np.int32],
+    threads: int,
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """Return rows of the connectivity; some of these inverted corner simplices, of one free vertex, are theirs.
 
-    Those that exclude each other, and those that are inverted for themselves wherever that slides.
+    Those that exclude each other, and those that are inverted for themselves wherever that slides. Those of hopeless
+    elements exclude no others.
     """
     if not len(inverted):
         return inverted, inverted
     stars = mesh.topology.stars(threads)
     corners = stars.simplices[inverted]
     freedom = None if mesh.freedom is None else mesh.freedom.kernel
-    together, alone = kernels.exclusive(points, stars, movable, distinct(corners[movable[corners]]), threads, freedom)
+    lost = np.zeros(mesh.topology.m, dtype=bool)
+    lost[hopeless] = True
+    lost = lost[mesh.topology.owners(np.arange(len(stars.simplices), dtype=np.int32))]
+    vertices = distinct(corners[movable[corners]])
+    together, alone = kernels.exclusive(points, stars, movable, lost, vertices, threads, freedom)
     return mesh.topology.owners(together), mesh.topology.owners(alone)
 
 

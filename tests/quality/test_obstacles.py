@@ -230,6 +230,15 @@ def test_simplices_of_one_free_vertex_that_exclude_each_other(random: np.random.
     assert 10 < named < 190
 
 
+def test_what_is_hopeless_excludes_nothing_else() -> None:
+    """The first of four quadrilaterals is inverted at a fixed corner; beside it, the others can be valid."""
+    points = np.array([[x, y] for y in range(3) for x in range(3)], dtype=float)
+    points[0] = 1.5, 1.5
+    quads = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+    found = find_obstacles(Mesh.build(points, [("quad", quads)]))
+    assert found.inverted.tolist() == [0] and not len(found.exclusive)
+
+
 def test_nothing_waits_for_what_obstacles_name() -> None:
     """A crossing boundary takes no more sweeps than it takes to mend the rest."""
     mesh = Mesh.build(*GEOMETRIES["plate with holes"]())

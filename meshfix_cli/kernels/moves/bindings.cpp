@@ -49,13 +49,15 @@ auto relocate_py(int move, const Matrix<double>& points, const Vector<std::uint8
 }
 
 auto exclusive_py(const Matrix<const double>& points, const PyConnectivity& self, const Vector<const bool>& movable,
-                  const Vector<const std::int32_t>& vertices, int threads, const Freedom* freedom) {
+                  const Vector<const bool>& hopeless, const Vector<const std::int32_t>& vertices, int threads, const Freedom* freedom) {
     if (!self.has_stars) throw nb::value_error("the stars are not built");
     check_points(points, self);
     check_freedom(freedom, self.mesh.n());
     const std::uint8_t* mask = bytes_of(movable, self.mesh.n());
+    const auto simplices = static_cast<std::int64_t>(self.mesh.simplices.size()) / (self.dimension + 1);
+    const std::uint8_t* lost = bytes_of(hopeless, simplices);
     Excluded found = with_dimension(self.dimension, [&](auto d) {
-        return exclusive_simplices<d>(self.mesh, stars_of(self.mesh), freedom, points.data(), mask, vertices.data(),
+        return exclusive_simplices<d>(self.mesh, stars_of(self.mesh), freedom, points.data(), mask, lost, vertices.data(),
                                       static_cast<std::int64_t>(vertices.shape(0)), threads);
     });
     return std::make_pair(to_numpy(std::move(found.together)), to_numpy(std::move(found.alone)));
@@ -289,8 +291,8 @@ void bind_moves(nb::module_& m) {
           "freedom"_a = nb::none());
     m.def("receive", &receive_py, "points"_a.noconvert(), "states"_a.noconvert(), "mesh"_a, "vertices"_a.noconvert(),
           "positions"_a.noconvert());
-    m.def("exclusive", &exclusive_py, "points"_a.noconvert(), "mesh"_a, "movable"_a.noconvert(), "vertices"_a.noconvert(),
-          "threads"_a, "freedom"_a = nb::none());
+    m.def("exclusive", &exclusive_py, "points"_a.noconvert(), "mesh"_a, "movable"_a.noconvert(), "hopeless"_a.noconvert(),
+          "vertices"_a.noconvert(), "threads"_a, "freedom"_a = nb::none());
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),

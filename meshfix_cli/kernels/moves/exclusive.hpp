@@ -19,23 +19,26 @@ struct Excluded {
     std::vector<std::int32_t> together, alone;
 };
 
-// Simplices of which one vertex is the only free one: their faces in its star, and what they are called.
+// Simplices of which one vertex is the only free one: their faces in its star, and what they are called. Hopeless ones are
+// left out: with what is inverted wherever anything goes, nothing else has to agree.
 struct Ring {
     std::vector<std::uint16_t> faces;
     std::vector<std::int32_t> owners;
 };
 
 template <int D>
-Ring ring_of(const Connectivity& mesh, const StarsView& stars, const std::uint8_t* movable, std::int32_t v) {
+Ring ring_of(const Connectivity& mesh, const StarsView& stars, const std::uint8_t* movable, const std::uint8_t* hopeless,
+             std::int32_t v) {
     const std::int32_t* neighbours = stars.neighbours + stars.neighbour_offsets[v];
     Ring found;
     for (std::int32_t i = stars.offsets[v]; i < stars.offsets[v + 1]; ++i) {
         const std::uint16_t* face = stars.faces + static_cast<std::int64_t>(i) * D;
-        bool alone = true;
+        const std::int32_t owner = mesh.corners[i] / (D + 1);
+        bool alone = hopeless[owner] == 0;
         for (int k = 0; k < D; ++k) alone &= movable[neighbours[face[k]]] == 0;
         if (!alone) continue;
         found.faces.insert(found.faces.end(), face, face + D);
-        found.owners.push_back(mesh.corners[i] / (D + 1));
+        found.owners.push_back(owner);
     }
     return found;
 }
@@ -108,8 +111,8 @@ void exclude_on_reference(const Star<D>& star, const std::vector<Affine<D>>& fun
 // Appends the simplices of a vertex that are excluded, none where they are not.
 template <int D>
 void find_exclusive(const Connectivity& mesh, const StarsView& stars, const Freedom* freedom, const double* points,
-                    const std::uint8_t* movable, std::int32_t v, Excluded& found) {
-    const Ring ring = ring_of<D>(mesh, stars, movable, v);
+                    const std::uint8_t* movable, const std::uint8_t* hopeless, std::int32_t v, Excluded& found) {
+    const Ring ring = ring_of<D>(mesh, stars, movable, hopeless, v);
     if (ring.owners.empty()) return;
     Star<D> star;
     star.gather(stars, freedom, points, points, v);
@@ -137,11 +140,12 @@ void find_exclusive(const Connectivity& mesh, const StarsView& stars, const Free
 // Of some vertices, in their order.
 template <int D>
 Excluded exclusive_simplices(const Connectivity& mesh, const StarsView& stars, const Freedom* freedom, const double* points,
-                             const std::uint8_t* movable, const std::int32_t* vertices, std::int64_t count, int threads) {
+                             const std::uint8_t* movable, const std::uint8_t* hopeless, const std::int32_t* vertices,
+                             std::int64_t count, int threads) {
     std::vector<Excluded> parts(count / PER_ITEM + 1);
     for_each_range(count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
         for (std::int64_t i = begin; i < end; ++i)
-            find_exclusive<D>(mesh, stars, freedom, points, movable, vertices[i], parts[item]);
+            find_exclusive<D>(mesh, stars, freedom, points, movable, hopeless, vertices[i], parts[item]);
     });
     Excluded found;
     for (const auto& part : parts) {

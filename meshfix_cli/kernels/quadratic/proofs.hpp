@@ -119,7 +119,7 @@ class QuadraticProofs {
 
     // Adds det J at places of an element as functions of one of its nodes, by the lengths of its edges.
     void add(std::int32_t e, int node, const std::vector<const Sum*>& places) {
-        if (places.empty()) return;
+        if (places.empty() || found_[e] == 1) return;  // with what is hopeless nothing else has to agree
         const QuadraticType& type = mesh_->type(e);
         const QuadraticParts<D, R> parts(type, mesh_->local<D, R>(points_, e));
         const double scale = type.doubt / parts.doubt();

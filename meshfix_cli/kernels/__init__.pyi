@@ -345,20 +345,10 @@ def foldover_energy(
     """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J; see `Foldover`."""
 
 def shape_energy(
-    points: Float64,
-    simplices: Int32,
-    corners: Float64,
-    owners: Int32,
-    free: int,
-    goal: float,
-    floor: float,
-    measure: float,
-    weight: float,
-    sharpness: float,
-    threads: int,
-    freedom: Freedom | None = None,
-    angle: float = ...,
-) -> tuple[float, Float64]:
+    points: Float64, simplices: Int32, corners: Float64, owners: Int32, free: int, goal: float, floor: float,
+    measure: float, weight: float, sharpness: float, evenness: float, threads: int,
+    freedom: Freedom | None = None, angle: float = ...,
+) -> tuple[float, Float64]:  # fmt: skip
     """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge.
 
     Simplices that are corners of elements have their weights in `corners` (m,), others 0; (0,): none is a corner. The
@@ -376,6 +366,7 @@ def shaped(
     measure: float,
     weight: float,
     sharpness: float,
+    evenness: float,
     iterations: int,
     threads: int,
     freedom: Freedom | None = None,

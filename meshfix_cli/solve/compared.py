@@ -78,6 +78,11 @@ class Compared:
             self._least = (*map(max, figures[:2], self._least[:2]), *self._least[2:])
         return points
 
+    def is_better(self, points: Array, others: Array) -> bool:
+        """Whether neither the smallest nor the mean of the scaled Jacobians is below that of the others (n, d)."""
+        (smallest, _, mean, *_), (its_smallest, _, its_mean, *_) = (self._judged(one)[1] for one in (points, others))
+        return smallest >= its_smallest and mean >= its_mean
+
     def stalls(self) -> bool:
         """Whether the last two, a turn, gained little."""
         return sum(max(rise, 0.0) for rise in self.rises[-2:]) < STALL

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.solve.foldover import evened
 from meshfix_cli.solve.region import Region
-from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped, sharply_shaped
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
@@ -20,10 +22,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-ITERATIONS = 100
+ITERATIONS, SHARP_ITERATIONS = 100, 50
 # There is something to gain where the smallest scaled Jacobian is below such a share of the mean and of the ceiling;
 # the second is that where the first percentile of the sizes is below `UNEVEN` of their mean.
 POOR, POOR_OF_UNEVEN, UNEVEN = 0.62, 0.7, 0.25
+LIFT = 3.0  # degrees by which the smallest should rise where worst corners judge
 
 
 def evened_where_poor(
@@ -37,6 +40,8 @@ def evened_where_poor(
     free: Mask,
 ) -> Iterator[Array]:
     """Yield the points (n, d) with even sizes and then the best shape, where scaled Jacobians are poor.
+
+    First as all corners judge it, then as the worst ones do, which leads farther.
 
     Parameters
     ----------
@@ -60,6 +65,8 @@ def evened_where_poor(
     if smallest < (POOR_OF_UNEVEN if uneven else POOR) * min(mean, ceiling(points, stars, free)):
         even = evened(points, stars, free, threads, ITERATIONS, freedom)
         yield shaped(even, stars, free, goal, threads, FEW_ITERATIONS, freedom)
+        held = replace(goal, floor=math.degrees(math.asin(smallest)) + LIFT)
+        yield sharply_shaped(even, stars, free, held, threads, SHARP_ITERATIONS, freedom)
 
 
 def ceiling(points: Array, mesh: kernels.Connectivity, free: Mask) -> float:

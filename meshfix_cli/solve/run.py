@@ -16,7 +16,7 @@ from meshfix_cli import kernels
 from meshfix_cli.solve.passes import Passes
 from meshfix_cli.solve.positions import ANGLE_STEPS, GAIN, Positions, Start
 from meshfix_cli.solve.records import SweepRecord
-from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, SHARPNESS, Goal, shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, Goal, shaped, sharply_shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
 
 if TYPE_CHECKING:
@@ -277,13 +277,13 @@ class Run(Positions):
         self.kept = self.points, self.record, smallest
         goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
         floor = math.degrees(smallest) if phase.shapes in ("lost", "sharp") else 0.0
-        sharpness = SHARPNESS if phase.shapes == "sharp" else 0.0
         most = self.pace.iterations if phase.shapes == "risen" else ITERATIONS
         most = FEW_ITERATIONS if phase.elements and phase.shapes == "first" else most
-        aims = Goal(goal, floor, max(self.min_measure, 0.0), sharpness)
+        aims = Goal(goal, floor, max(self.min_measure, 0.0))
+        minimised = sharply_shaped if phase.shapes == "sharp" else shaped
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
-            yield shaped(points, stars, free, aims, self.threads, most, self.team.freedom)
+            yield minimised(points, stars, free, aims, self.threads, most, self.team.freedom)
 
         yield from self._of_whole(compute, self.points, self._smoothed(phase) & self.together)
 
@@ -311,17 +311,22 @@ class Run(Positions):
         compute = partial(even.evened_where_poor, smallest, mean, aims, self.threads, self.team.freedom)
         for points in self._of_whole(compute, self.points, self.together):
             there = self._angles(points)
-            if math.sin(self._least(there)) > smallest and self.team.total(self._steps(kernels.sin(there))) > total:
+            now = math.sin(self._least(there)), self.team.total(self._steps(kernels.sin(there)))
+            if now[0] > smallest and now[1] > total and self._comparer().is_better(points, self.points):
+                smallest, total = now
                 yield points
 
     def compare(self) -> bool:
         """Take the mesh for a candidate for the last one; whether something in it was drawn back."""
         if self.left or self.mendable.simplicial:
             return False
+        self.compared = self.compared or self._comparer()
+        return self._go_to(self.compared.add(self.points, self._of))
+
+    def _comparer(self) -> Compared:
         from meshfix_cli.solve.compared import Compared  # the formulas of metrics, which others do not need
 
-        self.compared = self.compared or Compared(self.input, self.mendable, self.own, self.team, self.threads)
-        return self._go_to(self.compared.add(self.points, self._of))
+        return Compared(self.input, self.mendable, self.own, self.team, self.threads)
 
     def take_compared(self) -> bool:
         """Go to the best candidate; False: it is the last mesh, or there is none."""

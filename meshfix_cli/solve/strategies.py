@@ -18,7 +18,7 @@ THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for plane and solid mesh
 SMOOTHING = "smoothing"
 FEATURE_ANGLE, MAX_DEVIATION = 40.0, 0.03  # degrees, and mean edge lengths: see `curved.Smooth`
 ROUNDS = 8  # of "best", at most, after the first
-TURNS, RATIO_SWEEPS = 4, 6  # of "best" where elements are not all simplices
+TURNS, RATIO_SWEEPS = 6, 6  # of "best" where elements are not all simplices
 MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold
 # From where to where the numbers of options go, of the command line and of Python; None: there is no end.
 RANGES: dict[str, tuple[int, int | None]] = {

@@ -13,7 +13,7 @@ from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.solve.region import Region
 from meshfix_cli.solve.shape import Goal, shaped
 
-GOAL = (30.0, 12.0, 0.0, 1.5, 0.0)  # degrees, degrees, measure, weight, sharpness
+GOAL = (30.0, 12.0, 0.0, 1.5, 0.0, 0.0)  # degrees, degrees, measure, weight, sharpness, evenness
 NO_CORNERS = np.empty(0), np.empty(0, dtype=np.int32)
 
 
@@ -34,7 +34,7 @@ def test_the_energy_is_that_of_the_metrics(mesh: Mesh) -> None:
     energy, _ = kernels.shape_energy(points, region.simplices, *NO_CORNERS, len(region.moving), *GOAL, 1)
     own = start.movable[start.topology.simplices].any(axis=1)
     ratio, angle = evaluate("mean_ratio", start)[own], evaluate("min_angle", start)[own]
-    goal, floor, _, weight, _ = GOAL
+    goal, floor, _, weight, *_ = GOAL
     below = np.maximum(0, goal - angle) ** 2 + 30 * np.maximum(0, floor - angle) ** 2
     assert (below > 0).any()
     assert energy == pytest.approx((-100 * ratio - 0.3 * angle + weight * below).sum(), rel=1e-9)

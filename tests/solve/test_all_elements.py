@@ -192,15 +192,17 @@ def test_smoothing_never_makes_a_valid_element_invalid_inside(random: np.random.
     assert tried > 10
 
 
-@pytest.mark.parametrize("sharpness", [0.0, 5.0, 15.0])
-def test_the_energy_of_corners_has_the_gradient_of_its_values(random: np.random.Generator, sharpness: float) -> None:
+@pytest.mark.parametrize(("sharpness", "evenness"), [(0.0, 0.0), (5.0, 0.0), (15.0, 0.0), (15.0, 8.0), (0.0, 2.0)])
+def test_the_energy_of_corners_has_the_gradient_of_its_values(
+    random: np.random.Generator, sharpness: float, evenness: float
+) -> None:
     mesh, vertex = one_star(random, 0.1)
     corners, free = mesh.topology.stars().simplices, 27
     points = np.ascontiguousarray(mesh.along_curve(mesh.points))
     weights = np.ones(len(corners))
     weights[:8] = 0.0
     owners = np.ascontiguousarray(mesh.topology.stars().owners)
-    goal = (40.0, 20.0, 0.0, 1.5, sharpness)
+    goal = (40.0, 20.0, 0.0, 1.5, sharpness, evenness)
 
     def value(x: NDArray[np.float64]) -> float:
         return kernels.shape_energy(x, corners, weights, owners, free, *goal, 1)[0]

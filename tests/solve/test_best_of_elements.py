@@ -11,6 +11,7 @@ from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.solve.compared import KEPT
 from meshfix_cli.solve.even import ceiling
+from meshfix_cli.solve.shape import Goal, sharply_shaped
 
 
 def tangled(name: str, how: str) -> Mesh:
@@ -58,13 +59,41 @@ def test_the_sharp_energy_is_between_mean_and_smallest_of_the_corners(sharpness:
     stars, points = mesh.topology.stars(1), np.ascontiguousarray(mesh.along_curve(mesh.points))
     simplices, owners = stars.simplices, np.ascontiguousarray(stars.owners)
     weights = np.ones(len(simplices))
-    energy, _ = kernels.shape_energy(points, simplices, weights, owners, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 1)
+    energy, _ = kernels.shape_energy(points, simplices, weights, owners, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 0.0, 1)
     edges = points[simplices[:, 1:]] - points[simplices[:, :1]]
     scaled = (np.linalg.det(edges) / np.linalg.norm(edges, axis=2).prod(axis=1)).reshape(-1, 8)
     soft = -np.log(np.exp(-sharpness * scaled).mean(axis=1)) / sharpness
     assert (soft <= scaled.mean(axis=1) + 1e-12).all()
     assert (soft >= scaled.min(axis=1)).all()
     assert energy == pytest.approx(-100 * 8 * soft.sum(), rel=1e-9)
+    even, _ = kernels.shape_energy(points, simplices, weights, owners, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 0.5, 1)
+    ratios = 3 * np.linalg.det(edges) ** (2 / 3) / (edges**2).sum(axis=(1, 2))
+    assert ratios.max() <= 1 + 1e-12  # a cube's corners have 1
+    assert energy - even == pytest.approx(100 * 0.5 * ratios.sum(), rel=1e-6)
+
+
+def test_a_turned_wall_leaves_no_poor_element() -> None:
+    mesh = Mesh.build(*MESHES["hex shell"]())
+    for smooth in ("auto", "best"):
+        outcome = untangle(tangled("hex shell", "hole turned by 20°"), smooth=smooth)
+        assert outcome.after.check()[0] == 0
+        assert corners(outcome.after).min() > 0.5 * corners(mesh).min()
+
+
+def test_edges_that_have_shrunk_grow_again() -> None:
+    # Scaled Jacobians do not see it, and no minimiser of them alone gets on from there.
+    mesh = Mesh.build(*MESHES["hex box"]())
+    stars, free = mesh.topology.stars(1), mesh.along_curve(mesh.movable)
+    points, h, edges = mesh.along_curve(mesh.points), mesh.mean_edge_length(), mesh.topology.edges()
+    middle = points[np.linalg.norm(points - 0.5, axis=1).argmin()]
+    away = np.linalg.norm(points - middle, axis=1, keepdims=True) / h
+    start = np.where(free[:, None], middle + (points - middle) * np.minimum(1, (away / 3) ** 3), points)
+    assert mesh.with_vertices(start).check()[0] == 0
+    after = sharply_shaped(start, stars, free, Goal(30.0), 1)
+    assert mesh.with_vertices(after).check()[0] == 0
+    assert corners(mesh.with_vertices(after)).mean() > 0.999 > corners(mesh.with_vertices(start)).mean()
+    shortest = [np.linalg.norm(one[edges[0]] - one[edges[1]], axis=1).min() for one in (start, after)]
+    assert shortest[1] > 0.5 * h > 5 * shortest[0]
 
 
 def test_no_motion_of_free_vertices_exceeds_the_ceiling(random: np.random.Generator) -> None:

@@ -8,6 +8,7 @@
 #include "moves/exclusive.hpp"
 #include "moves/foldover_problem.hpp"
 #include "moves/relocate.hpp"
+#include "moves/scaled.hpp"
 #include "moves/shape.hpp"
 
 namespace meshfix {
@@ -186,11 +187,11 @@ struct ShapeArguments {
 
 auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                      const Vector<const double>& corners, const Vector<const std::int32_t>& owners, std::int64_t free,
-                     double goal, double floor, double measure, double weight, double sharpness, int threads,
-                     const Freedom* freedom, double angle) {
+                     double goal, double floor, double measure, double weight, double sharpness, double evenness,
+                     int threads, const Freedom* freedom, double angle) {
     check_freedom(freedom, free);
     const std::size_t d = points.shape(1);
-    const ShapeGoal aims{goal, floor, measure, weight, sharpness, angle};
+    const ShapeGoal aims{goal, floor, measure, weight, sharpness, evenness, angle};
     const ShapeArguments arguments{points, simplices, corners, owners, free, aims, freedom, threads};
     std::vector<double> gradient(static_cast<std::size_t>(free) * d);
     const double value = with_dimension(d, [&](auto dimension) {
@@ -201,20 +202,28 @@ auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std:
     return std::make_tuple(value, to_numpy(std::move(gradient), d));
 }
 
+template <class Function>
+std::vector<double> minimised(Function function, int iterations, int threads) {
+    const std::int64_t size = function.size();
+    Lbfgs<Function> lbfgs(std::move(function), size, threads);
+    lbfgs.start();
+    lbfgs.minimise(iterations);
+    return lbfgs.function().free_points(lbfgs.x());
+}
+
 // The free points where so many iterations end.
 auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                const Vector<const double>& corners, const Vector<const std::int32_t>& owners, std::int64_t free, double goal,
-               double floor, double measure, double weight, double sharpness, int iterations, int threads,
-               const Freedom* freedom, double angle) {
+               double floor, double measure, double weight, double sharpness, double evenness, int iterations,
+               int threads, const Freedom* freedom, double angle) {
     check_freedom(freedom, free);
     const std::size_t d = points.shape(1);
-    const ShapeGoal aims{goal, floor, measure, weight, sharpness, angle};
+    const ShapeGoal aims{goal, floor, measure, weight, sharpness, evenness, angle};
     const ShapeArguments arguments{points, simplices, corners, owners, free, aims, freedom, threads};
     return to_numpy(with_dimension(d, [&](auto dimension) {
-        Lbfgs<Shape<dimension>> lbfgs(arguments.make<dimension>(), free * dimension, threads);
-        lbfgs.start();
-        lbfgs.minimise(iterations);
-        return lbfgs.function().free_points(lbfgs.x());
+        auto shape = arguments.make<dimension>();
+        return sharpness > 0.0 ? minimised(Scaled<Shape<dimension>>(std::move(shape)), iterations, threads)
+                               : minimised(std::move(shape), iterations, threads);
     }), d);
 }
 
@@ -296,12 +305,11 @@ void bind_moves(nb::module_& m) {
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
-          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "threads"_a,
-          "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
+          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "evenness"_a,
+          "threads"_a, "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
-          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "iterations"_a,
-          "threads"_a,
-          "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
+          "owners"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "evenness"_a,
+          "iterations"_a, "threads"_a, "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DONE") = DONE;
     m.attr("DUE") = DUE;

@@ -7,9 +7,11 @@
 // t the smallest angle in degrees; the goal lifts the few that are worse than the others, the floor holds the worst, and
 // the last term the smallest determinant, where `least` is positive.
 // Where elements are not all simplices, of their corners
-//         - RATIO q + weight (...), q the scaled Jacobian, t its arc sine in degrees;
+//         - RATIO (q + evenness r) + weight (...), q the scaled Jacobian, t its arc sine in degrees, r the mean ratio
+// of the corner to one whose edges are as long and whose scaled Jacobian is 1;
 // where the sharpness k is not 0, the q of an element's n corners have their place taken by n times what lies between
 // their mean and their smallest, -1/k log (1/n sum exp(-k q)): elements are judged by their worst corners.
+// Scaled Jacobians do not mind edges that shrink to nothing, which stop the minimiser; the mean ratio does.
 //
 // It is infinite where a simplex has no positive determinant, so that a minimiser that starts from a valid mesh never
 // leaves those. The mean ratio is that of P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
@@ -23,6 +25,7 @@ namespace meshfix {
 
 struct ShapeGoal {
     double degrees, floor, measure, weight, sharpness;
+    double evenness;
     double angle;  // what a degree of a smallest angle is worth
 };
 
@@ -79,6 +82,8 @@ class Shape {
         least_ = factorial(D) * goal.measure / (D == 2 ? unit_ * unit_ : unit_ * unit_ * unit_);
     }
 
+    std::int64_t size() const { return free_ * D; }
+
     Numbers start() const {
         Numbers x(free_ * D);
         std::copy(points_.begin(), points_.begin() + free_ * D, x.data());
@@ -99,6 +104,27 @@ class Shape {
     bool enough() const { return false; }
     double least_gain() const {
         return (elements_.empty() ? SHAPE_GAIN : SHAPE_SHARP_GAIN) * static_cast<double>(assembly_.size());
+    }
+
+    // Of each free vertex, between the shortest and the mean of the edges that corners have there.
+    std::vector<double> sizes() const {
+        const auto n = points_.size() / D;
+        std::vector<double> shortest(n, INFINITY), sum(n), count(n), sizes(free_);
+        const auto& simplices = assembly_.simplices();
+        for (std::size_t s = 0; s < simplices.size(); s += D + 1) {
+            for (int k = 1; k <= D; ++k) {
+                const std::size_t ends[] = {static_cast<std::size_t>(simplices[s]), static_cast<std::size_t>(simplices[s + k])};
+                const double length = std::sqrt(norm2(load<D>(&points_[ends[1] * D]) - load<D>(&points_[ends[0] * D])));
+                for (std::size_t end : ends) {
+                    shortest[end] = smaller(shortest[end], length);
+                    sum[end] += length;
+                    count[end] += 1.0;
+                }
+            }
+        }
+        for (std::int64_t v = 0; v < free_; ++v)
+            sizes[v] = count[v] > 0.0 ? std::sqrt(shortest[v] * sum[v] / count[v]) : 1.0;
+        return sizes;
     }
 
     // The free points (free, D) at a vector, in model units.
@@ -157,20 +183,25 @@ class Shape {
         LaneSum energy;
         for (std::int64_t s = begin; s < end; s += LANES) {
             const Edges<D, Pack> e = assembly_.edges(points_.data(), s, end);
-            Corners<D, Pack> slopes;
-            Pack value = of_ratio(e, slopes);
-            const auto cosine = cosines<D>(e);
             const int count = static_cast<int>(std::min<std::int64_t>(LANES, end - s));
-            for (int i = 0; i < count; ++i) {
-                if (!corners_.empty() && corners_[s + i] > 0.0) {
-                    value[i] = of_corner(e, i, s + i, slopes);
-                    continue;
+            Corners<D, Pack> slopes;
+            Pack value{};
+            const auto is_corner = [&](int i) { return !corners_.empty() && corners_[s + i] > 0.0; };
+            int simplices = 0;
+            for (int i = 0; i < count; ++i) simplices += !is_corner(i);
+            if (simplices > 0) {
+                value = of_ratio(e, slopes);
+                const auto cosine = cosines<D>(e);
+                for (int i = 0; i < count; ++i) {
+                    if (is_corner(i)) continue;
+                    std::size_t k = 0;
+                    for (std::size_t other = 1; other < cosine.size(); ++other)
+                        if (cosine[other][i] > cosine[k][i]) k = other;
+                    value[i] += of_angle(e, i, k, cosine[k][i], slopes);
                 }
-                std::size_t k = 0;
-                for (std::size_t other = 1; other < cosine.size(); ++other)
-                    if (cosine[other][i] > cosine[k][i]) k = other;
-                value[i] += of_angle(e, i, k, cosine[k][i], slopes);
             }
+            for (int i = 0; i < count; ++i)
+                if (is_corner(i)) value[i] = of_corner(e, i, s + i, slopes);
             for (int i = count; i < LANES; ++i) value[i] = 0.0;
             assembly_.add(slopes, s, count);
             energy.add(static_cast<std::size_t>((s - begin) / LANES), value);
@@ -219,14 +250,26 @@ class Shape {
         if (missing + below > 0.0)
             slope -= 2.0 * goal_.weight * (missing + below) * DEGREE / std::sqrt(larger(1.0 - q * q, 1e-6));
         const Edges<D> normals = determinant_slopes(e);
+        const double edges2 = sum_of(e), even = SHAPE_RATIO * goal_.evenness * ratio(corners_[s] * det, edges2);
         Vec<D> first{};
         for (int k = 0; k < D; ++k) {
-            const Vec<D> mine = (slope * q) * ((1.0 / det) * normals[k] - (1.0 / norm2(e[k])) * e[k]);
+            Vec<D> mine = (slope * q) * ((1.0 / det) * normals[k] - (1.0 / norm2(e[k])) * e[k]);
+            if (even > 0.0) mine = mine - (2.0 * even) * ((1.0 / (D * det)) * normals[k] - (1.0 / edges2) * e[k]);
             first = first - mine;
             for (int x = 0; x < D; ++x) slopes[k + 1][x][i] = mine[x];
         }
         for (int x = 0; x < D; ++x) slopes[0][x][i] = first[x];
-        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) + share.value;
+        return goal_.weight * (missing * missing + below * below / SHAPE_FLOOR) + share.value - even;
+    }
+
+    static double sum_of(const Edges<D>& e) {
+        double sum = 0.0;
+        for (int k = 0; k < D; ++k) sum += norm2(e[k]);
+        return sum;
+    }
+
+    static double ratio(double det, double edges2) {
+        return D / edges2 * (D == 2 ? det : std::cbrt(det) * std::cbrt(det));
     }
 
     static Edges<D> lane(const Edges<D, Pack>& edges, int i) {

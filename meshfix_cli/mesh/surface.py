@@ -105,8 +105,10 @@ def laid_by_default(mesh: Mesh, smooth: Smooth, reference: Array | None = None, 
 
 def _is_elsewhere(freedom: Freedom, points: Array, far: float, threads: int) -> bool:
     """Whether most of the points (k, 3) that slide on curves and surfaces are far from these."""
-    off = freedom.rounded(points, threads)[1][freedom.curved] > far
-    return bool(2 * off.sum() > len(off))
+    half = int(freedom.curved.sum()) // 2
+    if freedom.shapes is None or int(kernels.off_reference(freedom.kernel, points, far, threads).sum()) <= half:
+        return False
+    return int((freedom.rounded(points, threads)[1] > far).sum()) > half
 
 
 def inward(mesh: Mesh) -> Mask:

@@ -95,15 +95,21 @@ def _are_zero(vectors: Array) -> Mask:
     return np.asarray((x == 0) & (y == 0) & (z == 0))
 
 
-def around(topology: Topology, areas: Array) -> tuple[Array, Array]:
-    """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3)."""
+def around(topology: Topology, areas: Array, edges: Mask | None = None) -> tuple[Array, Array]:
+    """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3).
+
+    The stars of vertices on sharp edges (k,) tell nothing of what is beside them.
+    """
     offsets, nodes = rows_of_elements(topology)
     m, k = len(areas), len(topology.connectivity.vertices)
     owners = np.repeat(np.arange(m, dtype=np.int32), np.diff(offsets))
+    edges = np.zeros(k, dtype=bool) if edges is None else edges
     of_stars = kernels.summed(nodes, areas, k, owners)
+    of_stars[edges] = 0.0
     start, end = topology.edges()
     for _ in range(RINGS):
         of_stars = of_stars + kernels.summed(start, of_stars, k, end) + kernels.summed(end, of_stars, k, start)
+        of_stars[edges] = 0.0
     return of_stars, kernels.summed(owners, of_stars, m, nodes)
 
 

@@ -13,9 +13,20 @@ from meshfix_cli.kernels._quadratic import QUADRATIC_SHAPES as QUADRATIC_SHAPES
 from meshfix_cli.kernels._quadratic import QuadraticEnergy as QuadraticEnergy
 from meshfix_cli.kernels._quadratic import QuadraticMesh as QuadraticMesh
 from meshfix_cli.kernels._quadratic import QuadraticType as QuadraticType
+from meshfix_cli.kernels._surface import Reference as Reference
 from meshfix_cli.kernels._surface import area_vectors as area_vectors
+from meshfix_cli.kernels._surface import around_pieces as around_pieces
+from meshfix_cli.kernels._surface import check_unfolded as check_unfolded
+from meshfix_cli.kernels._surface import counted_order as counted_order
+from meshfix_cli.kernels._surface import dots_between as dots_between
+from meshfix_cli.kernels._surface import fan_normals as fan_normals
+from meshfix_cli.kernels._surface import joints as joints
+from meshfix_cli.kernels._surface import off_reference as off_reference
 from meshfix_cli.kernels._surface import relocate_on_surface as relocate_on_surface
+from meshfix_cli.kernels._surface import sines_between as sines_between
+from meshfix_cli.kernels._surface import summed as summed
 from meshfix_cli.kernels._surface import unfold as unfold
+from meshfix_cli.kernels._surface import unit_vectors as unit_vectors
 
 Int8 = NDArray[np.int8]
 Int32 = NDArray[np.int32]
@@ -165,27 +176,6 @@ class Freedom:
 
     def keep_near(self, offsets: Int32, around: Int32, bound: float) -> None:
         """Take what is around vertices on the reference, see mesh/freedom.hpp, and how far it may be from that."""
-
-class Reference:
-    """Surfaces and curves, see mesh/reference.hpp; copies of what it is given."""
-
-    def __init__(self, corners: Float64, ways: Float64, first: Int32, directions: Uint8) -> None:
-        """Take the corners (p, d, d) of pieces, normals or tangents there, and of each shape the first and directions.
-
-        `first` (s + 1,) ends with the number of pieces; `directions` (s,) is 2 for a surface and 1 for a curve.
-        """
-
-    def let_walk(self, vertices: Int32) -> None:
-        """Let searches go from piece to piece: which corners (p, 3) are one."""
-
-    def nearest(self, points: Float64, shapes: Int32, threads: int, near: Int32 = ...) -> tuple[Float64, Float64]:
-        """Put points (q, d) on their shapes (q,), which are rounded between corners.
-
-        The distances (q,) are those from the pieces as they are; searches begin at pieces `near` (q,) if there are any.
-        """
-
-    def farthest(self, points: Float64, shapes: Int32, threads: int, near: Int32) -> float:
-        """The largest of the distances that `nearest` gives, of no points 0."""
 
 def joined(pairs: Int32, n: int) -> Int32:
     """Number things (n,) so that those which pairs (p, 2) join have one number: the smallest of them."""

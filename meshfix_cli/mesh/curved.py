@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.patches import Constraints, Joints, normals_of, numbered, of_two, summed, unit_vectors
+from meshfix_cli.mesh.patches import Constraints, Joints, normals_of, numbered, of_two, unit_vectors
 from meshfix_cli.mesh.topology import rows_of_part
 
 Array = NDArray[np.float64]
@@ -84,11 +84,7 @@ class Shapes:
     @cached_property
     def kernel(self) -> kernels.Reference:
         """The same for the kernels; parts that are sent to other processes are made anew."""
-        return self._kernel_at(self.corners)
-
-    def _kernel_at(self, corners: Array) -> kernels.Reference:
-        """Return it with its corners elsewhere."""
-        made = kernels.Reference(corners, self.ways, self.first, self.directions)
+        made = kernels.Reference(self.corners, self.ways, self.first, self.directions)
         if self.walks:
             made.let_walk(self.vertices)
         return made
@@ -107,22 +103,15 @@ class Shapes:
         That is found at vertices, and at the middles of edges and triangles. With it the largest of `deviations`.
         """
         moved = np.ascontiguousarray(points[self.vertices])
-        deviation = self._farthest(self.kernel, self._middles(moved), threads)
-        back = [*self._middles(self.corners), *np.swapaxes(self.corners, 0, 1)]
-        others = self._farthest(self._kernel_at(moved), back, threads)
-        return max(deviation, others, self._farthest(self.kernel, [*np.swapaxes(moved, 0, 1)], threads)), deviation
+        deviation, back = self.kernel.farthest(moved, False, threads), self.kernel.at_corners(moved)
+        others = (back.farthest(self.corners, of_corners, threads) for of_corners in (False, True))
+        return max(deviation, *others, self.kernel.farthest(moved, True, threads)), deviation
 
     def deviations(self, points: Array, threads: int = 1) -> Array:
         """Tell how far (p,) the middles of each piece are from the reference, at most; its corners at points (k, d)."""
         pieces = np.arange(len(self.shape), dtype=np.int32)
         near = (np.ascontiguousarray(some) for some in self._middles(points[self.vertices]))
         return np.asarray(np.max([self.kernel.nearest(some, self.shape, threads, pieces)[1] for some in near], axis=0))
-
-    def _farthest(self, reference: kernels.Reference, places: list[Array], threads: int) -> float:
-        """Return how far places, each (p, d) of the pieces, are from a reference at most."""
-        pieces = np.arange(len(self.shape), dtype=np.int32)
-        near = (np.ascontiguousarray(some) for some in places)
-        return max(reference.farthest(some, self.shape, threads, pieces) for some in near)
 
     @cached_property
     def shape(self) -> Numbers:
@@ -154,7 +143,9 @@ class Curved:
     shapes: Shapes
 
 
-def curved_of(points: Array, given: Constraints, smooth: Smooth, flat: NDArray[np.uint8]) -> Curved:
+def curved_of(
+    points: Array, given: Constraints, smooth: Smooth, flat: NDArray[np.uint8], joints: Joints | None = None
+) -> Curved:
     """Find the vertices that slide on surfaces and curves.
 
     Parameters
@@ -166,10 +157,12 @@ def curved_of(points: Array, given: Constraints, smooth: Smooth, flat: NDArray[n
     flat : (k,) uint8
         In how many directions vertices slide in lines and planes already. Those in a line that is no feature, such as
         an edge of a prism of many sides, go onto the surface.
+    joints : Joints, optional
+        Of facets in space; None: they lie in a plane.
     """
-    if points.shape[1] == 2:
+    if joints is None:
         return _Plane(points, given, smooth).found(flat)
-    return _Solid(points, given, smooth).found(flat)
+    return _Solid(points, given, smooth, joints).found(flat)
 
 
 class _Shaped:
@@ -184,7 +177,7 @@ class _Shaped:
         """(p,) bool: facets (p, 2) that are of one label and turn by less than the feature angle."""
         one, other = pairs.T
         labels, inverted = self.given.labels, self.given.inverted
-        cosine, same = (self.units[one] * self.units[other]).sum(axis=1), labels[one] == labels[other]
+        cosine, same = kernels.dots_between(self.units, pairs), labels[one] == labels[other]
         self.folds = int((same & (cosine < -abs(self.smooth.cosine)) & (inverted[one] | inverted[other])).sum())
         return np.asarray(same & (cosine >= self.smooth.cosine))
 
@@ -225,9 +218,8 @@ class _Plane(_Shaped):
         shape[vertices[mine]] = number[chain[pairs[mine, 0]]]
         tangents = self.tangents(facets, vertices, pairs)
         pieces = _Pieces(facets, tangents, number[chain])
-        edges = _both_ways(facets)
-        around = _around(edges, np.tile(number[chain], 2), np.tile(np.arange(len(facets)), 2))
-        return _curved(shape, edges, around, [pieces], [1] * curves, self)
+        none = _Pieces(np.empty((0, 3), dtype=np.int32), tangents[:0], number[:0])
+        return _curved(shape, _both_ways(facets), none, pieces, [1] * curves, self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,9 +234,9 @@ class _Pieces:
 class _Solid(_Shaped):
     """Of a solid: facets meet at edges, and those that are features meet at vertices."""
 
-    def __init__(self, points: Array, given: Constraints, smooth: Smooth) -> None:
+    def __init__(self, points: Array, given: Constraints, smooth: Smooth, joints: Joints) -> None:
         super().__init__(points, given, smooth)
-        self.joints = Joints(given.facets, given.lines)
+        self.joints = joints
         good = self.meet_smoothly(self.joints.pairs)
         self.is_feature, self.around = self.joints.divided(good)
         self.patch = kernels.joined(np.ascontiguousarray(self.joints.pairs[good]), len(given.facets))
@@ -278,76 +270,51 @@ class _Solid(_Shaped):
         triangles = self._triangles(number)
         tangents = self.tangents(features, vertices, pairs)
         segments = _Pieces(features[:, [0, 1, 1]], tangents[:, [0, 1, 1]], of_curve[chain])
-        both = _both_ways(features)
-        turned = np.concatenate([np.roll(triangles.vertices, -i, axis=1) for i in range(3)])
-        number_of_segment = np.arange(len(features)) + len(triangles.shape)
-        along = _around(both, np.tile(segments.shape, 2), np.tile(number_of_segment, 2))
-        around = _around(turned, np.tile(triangles.shape, 3), np.tile(np.arange(len(triangles.shape)), 3))
-        around = np.concatenate([around, along])
-        every = _both_ways(self.joints.edges)
+        both, every = _both_ways(features), _both_ways(self.joints.edges)
         edges = np.concatenate([every[on_surface[every[:, 0]]], both[on_curve[both[:, 0]]]])
         directions = [2] * surfaces + [1] * curves
-        return _curved(shape, edges, around, [triangles, segments], directions, self)
+        return _curved(shape, edges, triangles, segments, directions, self)
 
     def _triangles(self, number: Numbers) -> _Pieces:
         """Return the triangles of facets, those with four corners cut in two, with the normals of their fans."""
-        facets = self.given.facets
+        facets, fan = self.given.facets, self.around.fan
+        of_fans = kernels.fan_normals(self.points, facets, self.units, fan)
+        if facets.shape[1] == 3:
+            return _Pieces(facets, of_fans[fan].reshape(-1, 3, 3), number[self.patch])
         corner = np.full(facets.shape, -1, dtype=np.int32)
-        corner[facets >= 0] = np.arange(len(self.around.vertices), dtype=np.int32)
-        rows, cuts = np.arange(len(facets)), [[0, 1, 2]]
-        which, places = [rows], [np.tile(cuts[0], (len(rows), 1))]
-        if facets.shape[1] == 4:
-            rows = np.flatnonzero(facets[:, 3] >= 0)
-            which.append(rows)
-            places.append(np.tile([0, 2, 3], (len(rows), 1)))
-        row, place = np.concatenate(which)[:, None], np.concatenate(places)
-        normals = self._normals()[self.around.fan[corner[row, place]]]
-        return _Pieces(facets[row, place], normals, number[self.patch[row[:, 0]]])
-
-    def _normals(self) -> Array:
-        """Return the unit normal of each fan (corners,), facets weighted by their angles there."""
-        facets = self.given.facets
-        rows, places = np.nonzero(facets >= 0)
-        width = (facets >= 0).sum(axis=1)[rows]
-        here = self.points[facets[rows, places]]
-        one, other = (unit_vectors(self.points[facets[rows, (places + step) % width]] - here) for step in (1, -1))
-        angle = kernels.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0))
-        weighted, fan = angle[:, None] * self.units[rows], self.around.fan
-        return unit_vectors(summed(fan, weighted, len(fan)))
+        corner[facets >= 0] = np.arange(len(fan), dtype=np.int32)
+        rows, whole = np.arange(len(facets)), np.flatnonzero(facets[:, 3] >= 0)
+        row = np.concatenate([rows, whole])[:, None]
+        place = np.concatenate([np.tile([0, 1, 2], (len(rows), 1)), np.tile([0, 2, 3], (len(whole), 1))])
+        return _Pieces(facets[row, place], of_fans[fan[corner[row, place]]], number[self.patch[row[:, 0]]])
 
 
 def _both_ways(edges: Numbers) -> Numbers:
     return np.concatenate([edges, edges[:, ::-1]])
 
 
-def _around(vertices: Numbers, shape: Numbers, piece: Places) -> Numbers:
-    """Return rows (r, 5): a vertex and the others, -1: there is no third, the shape and the piece that they make."""
-    third = [] if vertices.shape[1] == 3 else [np.full(len(vertices), -1)]
-    return np.column_stack([vertices, *third, shape, piece]).astype(np.int32)
-
-
 def _curved(
-    shape: Numbers, edges: Numbers, around: Numbers, pieces: list[_Pieces], directions: list[int], found: _Shaped
+    shape: Numbers, edges: Numbers, triangles: _Pieces, segments: _Pieces, directions: list[int], found: _Shaped
 ) -> Curved:
-    """Put together what slides: of pieces, and rows (r, 5) of what is around their first vertices, what is needed."""
-    points = found.points
-    of_piece = np.concatenate([one.shape for one in pieces])
-    order = np.argsort(of_piece, kind="stable")[int((of_piece < 0).sum()) :]
-    count = len(directions)
-    first = np.concatenate([[0], np.cumsum(np.bincount(of_piece[order], minlength=count))]).astype(np.int32)
-    vertices = np.concatenate([one.vertices for one in pieces])[order]
-    ways = np.concatenate([one.ways for one in pieces])[order]
+    """Put together what slides: of pieces and what is around their vertices, what is needed."""
+    points, of_piece = found.points, np.concatenate([triangles.shape, segments.shape])
+    order, first = kernels.counted_order(of_piece + np.int32(1), len(directions) + 1)
+    order, first = order[first[1] :], first[1:] - first[1]  # but for those of none
+    if np.array_equal(order, np.arange(len(triangles.shape))):  # as of one surface
+        vertices, ways = np.ascontiguousarray(triangles.vertices), triangles.ways
+    else:
+        pieces = [triangles, segments] if len(triangles.shape) else [segments]
+        vertices = np.concatenate([one.vertices for one in pieces])[order]
+        ways = np.concatenate([one.ways for one in pieces])[order]
     bounded = shape >= 0
     if found.given.normals is not None:  # a surface: its flat parts go over into others
-        bounded[around[bounded[around[:, 0]] & (around[:, 3] >= 0), 1:3]] = True
-    around = around[bounded[around[:, 0]] & (around[:, 3] >= 0)]
-    around = around[np.argsort(around[:, 0], kind="stable")]
+        bounded[vertices[np.logical_or.reduce([bounded[corner] for corner in vertices.T])]] = True
     place = np.empty(len(of_piece), dtype=np.int32)
     place[order] = np.arange(len(order), dtype=np.int32)
-    around[:, 4] = place[around[:, 4]]
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(around[:, 0], minlength=len(points)))]).astype(np.int32)
+    some, others = (np.ascontiguousarray(one.vertices) for one in (triangles, segments))
+    around = kernels.around_pieces(some, others, of_piece, place, bounded)
     shapes = Shapes(
-        vertices, points[vertices], ways, first, np.array(directions, dtype=np.uint8), offsets,
-        np.ascontiguousarray(around[:, 1:]), found.smooth.bound, found.folds, found.given.normals is not None,
+        vertices, points[vertices], ways, first, np.array(directions, dtype=np.uint8), *around, found.smooth.bound,
+        found.folds, found.given.normals is not None,
     )  # fmt: skip
     return Curved(shape, edges[shape[edges[:, 0]] >= 0], shapes)

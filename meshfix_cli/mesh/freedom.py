@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
-from meshfix_cli.mesh.patches import Constraints, Slides, lines_of_plane, of_solid, tolerance_of
+from meshfix_cli.mesh.patches import Constraints, Joints, Slides, lines_of_plane, of_solid, tolerance_of
 from meshfix_cli.mesh.topology import Topology, rows_of_part
 
 if TYPE_CHECKING:
@@ -178,7 +178,11 @@ def freedom_of(points: Array, constraints: Constraints, smooth: Smooth | None = 
     ends = constraints.facets[:, :2]
     length = float(np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1).mean())
     tolerance = tolerance_of(points, length)
-    found = [lines_of_plane(points, constraints, tolerance)] if d == 2 else of_solid(points, constraints, tolerance)
+    joints = None if d == 2 else Joints(constraints.facets, constraints.lines, k)
+    if joints is None:
+        found = [lines_of_plane(points, constraints, tolerance)]
+    else:
+        found = of_solid(points, constraints, tolerance, joints)
     frame, known = np.full(k, -1, dtype=np.int32), 0
     for slides in found:
         frame[slides.vertices] = known + slides.frame
@@ -191,7 +195,7 @@ def freedom_of(points: Array, constraints: Constraints, smooth: Smooth | None = 
     from meshfix_cli.mesh.curved import curved_of
 
     degrees = np.append(np.concatenate(directions), np.uint8(0))
-    curved = curved_of(points, constraints, smooth, degrees[frame])
+    curved = curved_of(points, constraints, smooth, degrees[frame], joints)
     mine = curved.shape >= 0
     frame[mine] = known + curved.shape[mine]
     pairs = [*(some[~mine[some[:, 0]]] for some in pairs), curved.pairs]
@@ -210,6 +214,7 @@ def _pairs(slides: Slides, k: int) -> Numbers:
 
 def _rows(pairs: list[Numbers], k: int) -> tuple[Numbers, Numbers]:
     """Return compressed rows of pairs, each ascending."""
-    first, second = np.concatenate(pairs).T
-    offsets = np.concatenate([[0], np.cumsum(np.bincount(first, minlength=k))]).astype(np.int32)
-    return offsets, np.ascontiguousarray(second[np.lexsort((second, first))])
+    first, second = np.ascontiguousarray(np.concatenate(pairs).T)
+    ascending, _ = kernels.counted_order(second, k)
+    order, offsets = kernels.counted_order(first[ascending], k)
+    return offsets, second[ascending[order]]

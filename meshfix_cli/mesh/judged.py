@@ -75,6 +75,8 @@ class Judged:
 
     def check(self, points: Array, threads: int) -> tuple[NDArray[np.int32], float]:
         """Return the positions of inverted elements, and the smallest signed measure of a corner simplex."""
+        if self.simplicial and self._unfolded is not None:
+            return self._unfolded.check(points, threads)
         inverted, smallest = kernels.check(*self._placed(points, threads), threads)
         if not self.simplicial:
             inverted = np.flatnonzero(self.judge(points, threads)[0]).astype(np.int32)
@@ -157,6 +159,10 @@ class Unfolded:
     def simplices(self) -> NDArray[np.int32]:
         """(s, 3) int32: their corner simplices, in these nodes."""
         return self.numbers.reshape(-1, 3) if self._codes is None else self.connectivity.simplices
+
+    def check(self, points: Array, threads: int) -> tuple[NDArray[np.int32], float]:
+        """Return what `Judged.check` does, where they are triangles."""
+        return kernels.check_unfolded(points, self._offsets, self._nodes, self._normals, threads)
 
     def points(self, points: Array, threads: int) -> Array:
         """Return where these nodes (sum of nodes, 2) are in the plane, from points (k, 3)."""

@@ -104,9 +104,9 @@ def lines_of_plane(points: Array, given: Constraints, tolerance: float) -> Slide
     return Slides(vertices[good][line.kept], line.frame, line.axes, 1, given.facets)
 
 
-def of_solid(points: Array, given: Constraints, tolerance: float) -> list[Slides]:
+def of_solid(points: Array, given: Constraints, tolerance: float, joints: Joints) -> list[Slides]:
     """Find the vertices of a solid mesh that slide along edges, and in planes."""
-    surface, joints = _Surface(points, given, tolerance), Joints(given.facets, given.lines)
+    surface = _Surface(points, given, tolerance)
     smooth, patch = surface.patches(joints.pairs)
     is_crease, around = joints.divided(smooth)
     creases = joints.edges[is_crease]
@@ -177,10 +177,11 @@ class _Surface:
         what is folded back is the other side of a slit.
         """
         one, other = pairs.T
-        labels, (n, m) = self.given.labels, (self.normals[one], self.normals[other])
-        smooth = (labels[one] == labels[other]) & ~(self.bent[one] | self.bent[other]) & (_sine(n, m) <= self.tolerance)
+        labels = self.given.labels
+        smooth = (labels[one] == labels[other]) & ~(self.bent[one] | self.bent[other])
+        smooth &= kernels.sines_between(self.normals, pairs) <= self.tolerance
         patch = kernels.joined(np.ascontiguousarray(pairs[smooth]), len(labels))
-        smooth &= ((n * m).sum(axis=1) >= 0) | self._tangled(patch)[patch[one]]
+        smooth &= (kernels.dots_between(self.normals, pairs) >= 0) | self._tangled(patch)[patch[one]]
         return smooth, kernels.joined(np.ascontiguousarray(pairs[smooth]), len(labels))
 
     def unfolded(self, group: Numbers, facets: Numbers, vertices: Numbers, patch: Numbers) -> Mask:
@@ -193,14 +194,14 @@ class _Surface:
 
     def _ratio(self, group: Numbers, facets: Numbers, count: int) -> Array:
         """Return |sum of normals| / sum of areas of groups (count,) of facets; 1 where there is no area."""
-        sums = summed(group, self.normals[facets], count)
+        sums = kernels.summed(group, self.normals, count, facets)
         total = np.bincount(group, self.areas[facets], count)
         return np.divide(np.linalg.norm(sums, axis=1), total, out=np.ones(count), where=total > 0)
 
     def _tangled(self, patch: Numbers) -> Mask:
         """(f,) bool, by the number of a patch: facets are turned over in it, and only such of inverted elements."""
         count = len(patch)
-        sums = summed(patch, self.normals, count)
+        sums = kernels.summed(patch, self.normals, count)
         over = (self.normals * sums[patch]).sum(axis=1) < 0
         by_itself = np.bincount(patch, over & ~self.given.inverted, count) > 0
         return ~by_itself & (np.linalg.norm(sums, axis=1) > SLIT * np.bincount(patch, self.areas, count))
@@ -208,12 +209,13 @@ class _Surface:
 
 def normals_of(points: Array, facets: Numbers, tolerance: float) -> tuple[Array, Mask]:
     """Return normals (f, d), as long as the facets are large, and which facets are not flat."""
+    if points.shape[1] == 3 and facets.shape[1] == 3:
+        offsets = np.arange(0, facets.size + 1, 3, dtype=np.int32)
+        return kernels.area_vectors(points, offsets, facets.ravel(), 1), np.zeros(len(facets), dtype=bool)
     p = points[facets]
     if points.shape[1] == 2:
         edges = p[:, 1] - p[:, 0]
         return np.stack([edges[:, 1], -edges[:, 0]], axis=1), np.zeros(len(facets), dtype=bool)
-    if facets.shape[1] == 3:
-        return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 2, np.zeros(len(facets), dtype=bool)
     p[:, 3] = np.where(facets[:, 3:] < 0, p[:, 0], p[:, 3])
     one, other = p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]
     normals = np.cross(one, other) / 2
@@ -225,13 +227,8 @@ def normals_of(points: Array, facets: Numbers, tolerance: float) -> tuple[Array,
 
 def unit_vectors(vectors: Array) -> Array:
     """Return vectors (..., d) of the length 1; those without a length stay."""
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0)
-
-
-def summed(group: Places, vectors: Array, count: int) -> Array:
-    """Return the sums (count, d) of vectors (x, d) by their groups (x,)."""
-    return np.stack([np.bincount(group, column, count) for column in vectors.T], axis=1)
+    rows = np.ascontiguousarray(vectors).reshape(-1, vectors.shape[-1])
+    return kernels.unit_vectors(rows).reshape(vectors.shape)
 
 
 def _sine(one: Array, other: Array) -> Array:
@@ -257,22 +254,22 @@ class Joints:
         Facets that meet at an edge of theirs alone, which is no line.
     """
 
-    def __init__(self, facets: Numbers, lines: Numbers) -> None:
-        self._sides = _sides(facets)
-        self.edges, here, self.count, is_line = _edges(self._sides, lines)
-        self._between = np.flatnonzero((self.count == 2) & ~is_line)
+    def __init__(self, facets: Numbers, lines: Numbers, n: int) -> None:
+        """Take facets (f, 3 or 4) and lines (l, 2) of n vertices."""
+        self._ends, self._owners, self.edges, here, self.count, is_line = kernels.joints(facets, lines, n)
+        self._vertices = facets.ravel() if facets.shape[1] == 3 else facets[facets >= 0]
+        self._between = np.flatnonzero((self.count == 2) & (is_line == 0))
         first = np.concatenate([[0], np.cumsum(self.count)])[self._between]
         self._two = np.stack([here[first], here[first + 1]], axis=1)  # sides
-        self.pairs = self._sides.owners[self._two]
+        self.pairs = self._owners[self._two]
 
     def divided(self, smooth: Mask) -> tuple[Mask, Around]:
         """Return at which edges (e,) facets do not go on in each other, as some pairs (p,) do, and their fans."""
         ends = np.ones(len(self.edges), dtype=bool)
         ends[self._between[smooth]] = False
-        joined = self._sides.ends[self._two[smooth]]  # corners, at the smaller vertex and at the larger one
-        corners = self._sides.corners
-        fan = kernels.joined(np.concatenate([joined[:, :, 0], joined[:, :, 1]]), len(corners))
-        return ends, Around(corners, self._sides.corner_owners, fan)
+        joined = self._ends[self._two[smooth]]  # corners, at the smaller vertex and at the larger one
+        fan = kernels.joined(np.concatenate([joined[:, :, 0], joined[:, :, 1]]), len(self._vertices))
+        return ends, Around(self._vertices, self._owners, fan)  # a facet has as many corners as sides
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,50 +300,11 @@ class Around:
         return vertices, pairs, points[edges[pairs].sum(axis=2) - vertices[:, None]] - points[vertices][:, None]
 
 
-@dataclass(frozen=True, eq=False)
-class _Sides:
-    """The sides (s,) of facets in space: from the smaller vertex to the larger, their facets, their corners there."""
-
-    vertices: Numbers
-    owners: Numbers
-    ends: Numbers
-    corners: Numbers
-    corner_owners: Numbers
-
-
-def _sides(facets: Numbers) -> _Sides:
-    there = facets >= 0
-    rows, places = np.nonzero(there)
-    corner = np.full(facets.shape, -1, dtype=np.int32)
-    corner[there] = np.arange(len(rows), dtype=np.int32)
-    after = (places + 1) % there.sum(axis=1)[rows]
-    vertices = np.stack([facets[rows, places], facets[rows, after]], axis=1)
-    ends = np.stack([corner[rows, places], corner[rows, after]], axis=1)
-    turned = vertices[:, 0] > vertices[:, 1]
-    vertices[turned], ends[turned] = vertices[turned, ::-1], ends[turned, ::-1]
-    return _Sides(vertices, rows.astype(np.int32), ends, facets[there], rows.astype(np.int32))
-
-
-def _edges(sides: _Sides, lines: Numbers) -> tuple[Numbers, NDArray[np.intp], NDArray[np.int64], Mask]:
-    """Return the edges (e, 2), the sides of facets edge by edge, how many each has (e,), and which are lines."""
-    both = np.concatenate([sides.vertices, np.sort(lines, axis=1)]).astype(np.int64)
-    key = both[:, 0] << 32 | both[:, 1]
-    order = np.argsort(key, kind="stable")
-    is_first = np.diff(key[order], prepend=-1) != 0
-    number = np.cumsum(is_first) - 1
-    is_side = order < len(sides.vertices)
-    count = np.bincount(number[is_side], minlength=int(is_first.sum()))
-    is_line = np.zeros(len(count), dtype=bool)
-    is_line[number[~is_side]] = True
-    return both[order[is_first]].astype(np.int32), order[is_side], count, is_line
-
-
 def of_two(vertices: Numbers, things: Numbers, n: int) -> tuple[Numbers, Numbers]:
     """Return the vertices (v,) that two of some things (x,) are at, at vertices (x,), and these (v, 2)."""
-    count = np.bincount(vertices, minlength=n)
-    order = np.argsort(vertices, kind="stable")
-    two = np.flatnonzero(count == 2)
-    first = np.concatenate([[0], np.cumsum(count)])[two]
+    order, offsets = kernels.counted_order(vertices, n)
+    two = np.flatnonzero(np.diff(offsets) == 2)
+    first = offsets[two]
     return two.astype(np.int32), np.stack([things[order[first]], things[order[first + 1]]], axis=1)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.patches import summed, unit_vectors
+from meshfix_cli.mesh.patches import unit_vectors
 from meshfix_cli.mesh.topology import Topology
 
 if TYPE_CHECKING:
@@ -75,27 +75,42 @@ def normals_seen(topology: Topology, points: Array, threads: int) -> Array:
     """
     areas = kernels.area_vectors(points, *rows_of_elements(topology), threads)
     own, pairs = unit_vectors(areas), joined_elements(topology)
-    turned = (own[pairs[:, 0]] * own[pairs[:, 1]]).sum(axis=1) < 0
-    flat = ~(own != 0).any(axis=1)
+    turned = kernels.dots_between(own, pairs) < 0
+    flat = _are_zero(own)
     if not (turned.any() or flat.any()):
         return own
     by_stars = unit_vectors(around(topology, areas)[1])
     patch = kernels.joined(np.ascontiguousarray(pairs[~turned]), len(own))
-    votes = np.bincount(patch, (areas * by_stars).sum(axis=1), len(own))[patch]
+    (x, y, z), (a, b, c) = areas.T, by_stars.T
+    along = x * a + y * b + z * c  # as a sum along rows it takes five times as long
+    votes = np.bincount(patch, along, len(own))[patch]
     normals = np.where(((votes < 0) | flat)[:, None], by_stars, own)
-    normals[~(normals != 0).any(axis=1), 2] = 1.0
+    normals[_are_zero(normals), 2] = 1.0
     return normals
 
 
-def around(topology: Topology, areas: Array) -> tuple[Array, Array]:
-    """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3)."""
+def _are_zero(vectors: Array) -> Mask:
+    """Mark those of some vectors (k, 3) that have no length."""
+    x, y, z = vectors.T
+    return np.asarray((x == 0) & (y == 0) & (z == 0))
+
+
+def around(topology: Topology, areas: Array, edges: Mask | None = None) -> tuple[Array, Array]:
+    """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3).
+
+    The stars of vertices on sharp edges (k,) tell nothing of what is beside them.
+    """
     offsets, nodes = rows_of_elements(topology)
-    owners, k = np.repeat(np.arange(len(areas)), np.diff(offsets)), len(topology.connectivity.vertices)
-    of_stars = summed(nodes, areas[owners], k)
+    m, k = len(areas), len(topology.connectivity.vertices)
+    owners = np.repeat(np.arange(m, dtype=np.int32), np.diff(offsets))
+    edges = np.zeros(k, dtype=bool) if edges is None else edges
+    of_stars = kernels.summed(nodes, areas, k, owners)
+    of_stars[edges] = 0.0
     start, end = topology.edges()
     for _ in range(RINGS):
-        of_stars = of_stars + summed(start, of_stars[end], k) + summed(end, of_stars[start], k)
-    return of_stars, np.add.reduceat(of_stars[nodes], offsets[:-1])
+        of_stars = of_stars + kernels.summed(start, of_stars, k, end) + kernels.summed(end, of_stars, k, start)
+        of_stars[edges] = 0.0
+    return of_stars, kernels.summed(owners, of_stars, m, nodes)
 
 
 def rows_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Numbers = NDArray[np.int32]
+LONG = 20  # vertices of features that go on in each other: no tangle feigns so many
 ASTRAY = 0.5  # mean edge lengths from a reference: where most vertices are farther away, it tells nothing of a surface
 
 
@@ -105,8 +106,10 @@ def laid_by_default(mesh: Mesh, smooth: Smooth, reference: Array | None = None, 
 
 def _is_elsewhere(freedom: Freedom, points: Array, far: float, threads: int) -> bool:
     """Whether most of the points (k, 3) that slide on curves and surfaces are far from these."""
-    off = freedom.rounded(points, threads)[1][freedom.curved] > far
-    return bool(2 * off.sum() > len(off))
+    half = int(freedom.curved.sum()) // 2
+    if freedom.shapes is None or int(kernels.off_reference(freedom.kernel, points, far, threads).sum()) <= half:
+        return False
+    return int((freedom.rounded(points, threads)[1] > far).sum()) > half
 
 
 def inward(mesh: Mesh) -> Mask:
@@ -125,7 +128,7 @@ def inward(mesh: Mesh) -> Mask:
     return found
 
 
-def in_planes(mesh: Mesh, region: Mask, threads: int = 1) -> Mesh:
+def in_planes(mesh: Mesh, region: Mask, edges: Mask, threads: int = 1) -> Mesh:
     """Return a surface whose vertices move in planes, their own or those that what is around them tells; see `seen`.
 
     Parameters
@@ -134,11 +137,13 @@ def in_planes(mesh: Mesh, region: Mask, threads: int = 1) -> Mesh:
         As `laid_out` gives it.
     region : (k,) bool
         Where a tangle is or was: vertices there, in the order of the connectivity, may seem to be on features.
+    edges : (k,) bool
+        Those that are on features beyond doubt: planes do not lean over these.
     threads : int
     """
     topology, points = mesh.topology, mesh.along_curve(mesh.points)
     assert mesh.surface is not None and mesh.surface.kept is not None
-    of_vertices, of_elements = _seen_around(mesh, threads)
+    of_vertices, of_elements = _seen_around(mesh, threads, edges)
     axes = frames_of(of_vertices)
     assert mesh.freedom is not None
     flat = (mesh.freedom.degrees == 2) & ~mesh.freedom.curved
@@ -158,10 +163,10 @@ def normals_of_vertices(mesh: Mesh, threads: int = 1) -> Array:
     return _seen_around(mesh, threads)[0]
 
 
-def _seen_around(mesh: Mesh, threads: int) -> tuple[Array, Array]:
-    """Return the unit normals that vertices (k, 3) and elements (m, 3) have by what is around them."""
+def _seen_around(mesh: Mesh, threads: int, edges: Mask | None = None) -> tuple[Array, Array]:
+    """Return the unit normals that vertices (k, 3) and elements (m, 3) have by what is around them, see `around`."""
     areas = kernels.area_vectors(mesh.along_curve(mesh.points), *rows_of_elements(mesh.topology), threads)
-    of_vertices, of_elements = around(mesh.topology, areas)
+    of_vertices, of_elements = around(mesh.topology, areas, edges)
     return unit_vectors(of_vertices), unit_vectors(of_elements)
 
 
@@ -193,3 +198,12 @@ def feigned(mesh: Mesh, region: Mask) -> Mask:
     held = surface.kept.held | ends
     lone = np.where(along, beside == 0, (freedom.degrees == 0) & (beside < 2))
     return np.asarray(region & lone & ~held)
+
+
+def on_edges(mesh: Mesh, region: Mask) -> Mask:
+    """Mark the vertices (k,) on features and boundaries that go on for long, as those that a tangle feigns do not."""
+    assert mesh.freedom is not None
+    found = np.asarray((mesh.freedom.degrees < 2) & ~feigned(mesh, region))
+    ends = np.stack(mesh.topology.edges(), axis=1)
+    chain = kernels.joined(np.ascontiguousarray(ends[found[ends].all(axis=1)]), len(found))
+    return np.asarray(found & (np.bincount(chain, found, len(found))[chain] >= LONG))

@@ -14,7 +14,7 @@ from meshfix_cli import kernels
 from meshfix_cli.errors import InvalidMeshError, ReadError, listed
 from meshfix_cli.mesh.elements import COLLAPSED, counted, dimension_of, words
 from meshfix_cli.mesh.mesh import BETWEEN, LARGEST_COORDINATE, ON_BOUNDARY, Mesh, mask_of
-from meshfix_cli.mesh.topology import Topology, distinct, refers_outside
+from meshfix_cli.mesh.topology import Topology, refers_outside
 from meshfix_cli.meshfile.coincident import first_of_each_place
 from meshfix_cli.meshfile.notes import concave, notes_on
 from meshfix_cli.meshfile.plane import is_level, plane_basis
@@ -431,15 +431,18 @@ def _solved_points(source: Source, solved: Solved) -> tuple[NDArray[np.float64],
         raise ReadError(f"its points have {counted(points.shape[-1], 'coordinate', 'coordinates')}")
     if points.shape[1] == dimension:
         return points, None
-    flat = np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
     vertices = solved.vertices()
     if vertices.min() < 0 or vertices.max() >= len(points):
-        return flat, None  # Mesh.build tells what is wrong, here and below
-    used = points[distinct(vertices)]
+        return _seen_from_above(points), None  # Mesh.build tells what is wrong, here and below
+    used = points[kernels.used_vertices(vertices.astype(np.int32, copy=False).reshape(-1, 1), len(points))]
     if not (np.abs(used) <= LARGEST_COORDINATE).all() or not np.ptp(used, axis=0).any():
-        return flat, None
+        return _seen_from_above(points), None
     basis = plane_basis(used, float(np.finfo(source.points.dtype).eps))
     return (points, None) if basis is None else (_flat(points, basis), basis)
+
+
+def _seen_from_above(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.where(np.isfinite(points).all(axis=1, keepdims=True), points[:, :2], np.nan)
 
 
 def _flat(points: NDArray[np.float64], basis: NDArray[np.float64]) -> NDArray[np.float64]:

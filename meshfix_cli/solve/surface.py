@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.surface import feigned, in_planes, laid_out, normals_of_vertices, seen, tangled
+from meshfix_cli.mesh.surface import (
+    feigned,
+    in_planes,
+    laid_out,
+    normals_of_vertices,
+    on_edges,
+    seen,
+    tangled,
+)
 from meshfix_cli.mesh.topology import read_only
 
 if TYPE_CHECKING:
@@ -48,8 +56,9 @@ def surface_steps(
         return
     best, first = mesh, True
     region = tangled(mesh, threads)
+    edges = on_edges(mesh, region)
     for _ in range(ROUNDS):
-        flat = moved = in_planes(best, region, threads)
+        flat = moved = in_planes(best, region, edges, threads)
         for moved, record in untangle(flat):
             if first or record.phase != "input":
                 yield _as_before(moved, mesh), record
@@ -64,7 +73,7 @@ def surface_steps(
             break
     for _ in range(ROUNDS):
         if inverted == 0 and (odd := feigned(best, region)).any():
-            yield from (found := _Last(smooth(_only(in_planes(best, region, threads), odd))))
+            yield from (found := _Last(smooth(_only(in_planes(best, region, edges, threads), odd))))
             best = _laid_on_sample(found.mesh, best, mesh, region, threads)
         yield from (found := _Last(smooth(best)))
         best = laid_out(seen(found.mesh, threads), surface.kept, threads=threads, region=region)

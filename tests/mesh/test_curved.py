@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import product
+from itertools import combinations, product
 
 import generate
 import numpy as np
@@ -65,10 +65,39 @@ def test_the_nearest_piece_is_that_of_a_search_among_all(d: int, directions: int
         seen = np.linalg.norm(places[:, None] - dense, axis=2).min(axis=1)
         assert (far <= seen + 1e-15).all()
         assert (seen - far <= 0.6 / steps).all()
-        near = np.full(40, begin, dtype=np.int32)
-        numbers = np.full(40, shape, dtype=np.int32)
-        assert all(reference.farthest(places, numbers, threads, near) == far.max() for threads in (1, 2))
-        assert reference.farthest(places[:0], numbers[:0], 1, near[:0]) == 0.0
+
+
+@pytest.mark.parametrize("walks", [False, True])
+@pytest.mark.parametrize(("d", "directions"), [(2, 1), (3, 1), (3, 2)])
+def test_the_farthest_of_moved_pieces_is_the_largest_distance_of_all(d: int, directions: int, walks: bool) -> None:
+    if walks and directions == 1:
+        return
+    random = np.random.default_rng(d + directions)
+    places = random.random((120, d))
+    vertices = random.integers(0, 120, (200, d)).astype(np.int32)
+    if directions == 1:
+        vertices[:, -1] = vertices[:, 1]
+    first, kinds = np.array([0, 70, 200], dtype=np.int32), np.full(2, directions, dtype=np.uint8)
+    number = np.repeat(np.arange(2, dtype=np.int32), np.diff(first))
+
+    def made(places: NDArray[np.float64]) -> kernels.Reference:
+        corners = places[vertices]
+        reference = kernels.Reference(corners, np.zeros_like(corners), first, kinds)
+        if walks:
+            reference.let_walk(vertices)
+        return reference
+
+    moved = places + 0.05 * random.standard_normal(places.shape)
+    before, after = places[vertices], moved[vertices]
+    for one, reference, other in ((after, made(places), before), (before, made(places).at_corners(after), after)):
+        some = [one[:, k] for k in range(directions + 1)]
+        ends = list(combinations(some, 2))
+        middles = [(a + b) / 2 for a, b in ends] + ([sum(some) / 3] if directions == 2 else [])
+        plain = kernels.Reference(other, np.zeros_like(other), first, kinds)
+        for of_corners, all_places in ((True, some), (False, middles)):
+            far = max(plain.nearest(np.ascontiguousarray(at), number, 1)[1].max() for at in all_places)
+            for threads in (1, 2):
+                assert reference.farthest(one, of_corners, threads) == pytest.approx(far, rel=1e-12)
 
 
 def sphere_error(mesh: Mesh) -> tuple[float, float]:

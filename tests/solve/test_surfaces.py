@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+import surface_bodies
+from surface_measures import folds
 from surfaces import Array, Rows, box, bumps, height, laid, off_torus, tangled, torus
 
 from meshfix_cli.mesh.mesh import Mesh
@@ -61,6 +63,17 @@ def test_without_a_reference_the_points_tell_the_surface(body: str) -> None:
     h = outcome.after.mean_edge_length()
     assert outcome.records[0].inverted > 50 and outcome.valid and far.max() < 0.1 * h
     assert summarise(outcome.after).folded == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rims_stay_where_a_tangle_beside_them_is_taken_for_its_own_reference(seed: int) -> None:
+    body = surface_bodies.cylinder(0.1)
+    folded = surface_bodies.tangled(body, 25, 1.5, seed)
+    assert folds(body, folded.points) > 500
+    outcome = untangle(Mesh.build(folded.points, folded.cells))
+    rim = np.unique(body.rims)
+    np.testing.assert_array_equal(outcome.after.points[rim], folded.points[rim])
+    assert outcome.valid and folds(body, outcome.after.points) == 0
 
 
 def test_threads_give_the_same_bits() -> None:

@@ -334,6 +334,12 @@ void let_walk(Reference& self, const Matrix<const std::int32_t>& vertices) {
     self.let_walk(vertices.data());
 }
 
+Reference at_corners(const Reference& self, const Matrices<const double>& corners) {
+    if (static_cast<int>(corners.shape(2)) != self.dimension() || corners.size() != self.size())
+        throw nb::value_error("the corners are of another reference");
+    return self.at_corners(corners.data());
+}
+
 // For points (q, D) each on its shape (q,), from pieces `near` (q,), if there are any: the nearest positions (q, D), and the distances (q,) from the pieces themselves.
 auto nearest_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
                 int threads, const std::int32_t* near) {
@@ -364,23 +370,17 @@ auto nearest_near_py(const Reference& self, const Matrix<const double>& points, 
     return nearest_py(self, points, shapes, threads, near.data());
 }
 
-// The largest distance of points (q, D) from their shapes (q,), by pieces near them (q,).
-double farthest_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
-                   int threads, const Vector<const std::int32_t>& near) {
-    const std::size_t count = points.shape(0);
-    if (static_cast<int>(points.shape(1)) != self.dimension() || shapes.shape(0) != count || near.shape(0) != count)
-        throw nb::value_error("the points are of another reference");
+// How far the pieces are from it at most, with their corners elsewhere (p, D, D): these, or middles.
+double farthest_py(const Reference& self, const Matrices<const double>& corners, bool of_corners, int threads) {
+    if (static_cast<int>(corners.shape(2)) != self.dimension() || corners.size() != self.size())
+        throw nb::value_error("the corners are of another reference");
     std::atomic<double> most2{0.0};
     with_dimension(self.dimension(), [&](auto dimension) {
-        constexpr int D = dimension;
-        for_each_range(static_cast<std::int64_t>(count), 1024, threads,
-                       [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-                           for (std::int64_t i = begin; i < end; ++i) {
-                               double least2 = most2.load();
-                               const double here2 = self.distance2_beyond<D>(least2, shapes.data()[i], load<D>(points.data() + i * D), near.data()[i]);
-                               while (here2 > least2 && !most2.compare_exchange_weak(least2, here2)) {}
-                           }
-                       });
+        for_each_range(static_cast<std::int64_t>(corners.shape(0)), 1024, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            double least2 = most2.load();
+            const double here2 = self.farthest2<dimension>(corners.data(), of_corners, begin, end, least2);
+            while (here2 > least2 && !most2.compare_exchange_weak(least2, here2)) {}
+        });
         return 0;
     });
     return std::sqrt(most2.load());
@@ -413,10 +413,11 @@ void bind_mesh(nb::module_& m) {
         .def("__init__", &init_reference, "corners"_a.noconvert(), "ways"_a.noconvert(), "first"_a.noconvert(),
              "directions"_a.noconvert())
         .def("let_walk", &let_walk, "vertices"_a.noconvert())
+        .def("at_corners", &at_corners, "corners"_a.noconvert())
         .def("nearest", [](const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
                            int threads) { return nearest_py(self, points, shapes, threads, nullptr); },
              "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a)
-        .def("farthest", &farthest_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert())
+        .def("farthest", &farthest_py, "corners"_a.noconvert(), "of_corners"_a, "threads"_a)
         .def("nearest", &nearest_near_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert());
     m.def("joined", &joined_py, "pairs"_a.noconvert(), "n"_a);
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);

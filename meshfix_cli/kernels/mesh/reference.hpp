@@ -14,6 +14,7 @@
 #include <tuple>
 #include <vector>
 
+#include "mesh/counting.hpp"
 #include "mesh/simplex.hpp"
 
 namespace meshfix {
@@ -40,6 +41,7 @@ class Reference {
         centres_.resize(order_.size() * dimension_);
         for (std::size_t i = 0; i < corners_.size(); ++i)
             centres_[i / (dimension_ * dimension_) * dimension_ + i % dimension_] += corners_[i];
+        find_boxes();
         for (std::size_t s = 0; s + 1 < first.size(); ++s) {
             roots_.push_back(static_cast<std::int32_t>(nodes_.size()));
             if (dimension_ == 2)
@@ -48,34 +50,64 @@ class Reference {
                 build<3>(first[s], first[s + 1]);
         }
         std::vector<double>().swap(centres_);
+        std::vector<Box>().swap(boxes_);
+    }
+
+    // The same shapes with their corners elsewhere: the boxes of its trees are other ones.
+    Reference at_corners(const double* corners) const {
+        Reference moved(*this);
+        std::copy(corners, corners + corners_.size(), moved.corners_.begin());
+        moved.find_boxes();
+        if (!beside_.empty()) moved.find_slopes();
+        for (std::size_t i = nodes_.size(); i-- > 0;) {
+            Node& node = moved.nodes_[i];
+            node.box = Box();
+            if (node.right != 0) {
+                node.box.include(moved.nodes_[i + 1].box);
+                node.box.include(moved.nodes_[node.right].box);
+            } else {
+                for (std::int32_t k = node.begin; k < node.end; ++k) node.box.include(moved.boxes_[order_[k]]);
+            }
+        }
+        std::vector<Box>().swap(moved.boxes_);
+        return moved;
     }
 
     // Lets searches go from piece to piece, where they begin at one. vertices (p, 3): numbers that tell which corners are one.
     void let_walk(const std::int32_t* vertices) {
         struct Side {
-            std::uint64_t ends;
-            std::int32_t shape, place;  // place: 3 * piece + side
+            std::int32_t low, high, place;  // place: 3 * piece + side
         };
         std::vector<Side> sides;
+        std::vector<std::int32_t> shape_of;
+        std::int32_t most = -1;
         for (std::size_t shape = 0; shape < shapes(); ++shape)
             for (std::int32_t piece = first_[shape]; directions_[shape] == 2 && piece < first_[shape + 1]; ++piece)
                 for (int i = 0; i < 3; ++i) {
-                    const auto a = static_cast<std::uint32_t>(vertices[piece * 3 + i]), b = static_cast<std::uint32_t>(vertices[piece * 3 + (i + 1) % 3]);
-                    sides.push_back({static_cast<std::uint64_t>(std::min(a, b)) << 32 | std::max(a, b), static_cast<std::int32_t>(shape), piece * 3 + i});
+                    const std::int32_t a = vertices[piece * 3 + i], b = vertices[piece * 3 + (i + 1) % 3];
+                    sides.push_back({std::min(a, b), std::max(a, b), piece * 3 + i});
+                    shape_of.push_back(static_cast<std::int32_t>(shape));
+                    most = std::max(most, sides.back().low);
                 }
-        std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-            return std::tie(a.shape, a.ends, a.place) < std::tie(b.shape, b.ends, b.place);
-        });
+        std::vector<std::int32_t> offsets;
+        const auto count = static_cast<std::int64_t>(sides.size());
+        std::vector<std::int32_t> order = counted_order(count, most + 1, offsets, [&](std::int64_t i) { return sides[i].low; });
+        for (std::int32_t v = 0; v <= most; ++v)
+            std::sort(order.begin() + offsets[v], order.begin() + offsets[v + 1], [&](std::int32_t a, std::int32_t b) {
+                return std::tie(shape_of[a], sides[a].high, a) < std::tie(shape_of[b], sides[b].high, b);
+            });
         beside_.assign(static_cast<std::size_t>(first_.back()) * 3, -1);
-        for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
-            const Side &one = sides[i], &other = sides[i + 1];
-            if (one.shape != other.shape || one.ends != other.ends) continue;
+        for (std::int64_t i = 0; i + 1 < count; ++i) {
+            const Side &one = sides[order[i]], &other = sides[order[i + 1]];
+            if (shape_of[order[i]] != shape_of[order[i + 1]] || one.low != other.low || one.high != other.high) continue;
             beside_[one.place] = other.place / 3;
             beside_[other.place] = one.place / 3;
         }
+        find_slopes();
     }
 
     int dimension() const { return dimension_; }
+    std::size_t size() const { return corners_.size(); }
     std::size_t shapes() const { return roots_.size(); }
     int directions(std::int32_t shape) const { return directions_[shape]; }
 
@@ -97,7 +129,7 @@ class Reference {
     template <int D>
     bool is_within(double bound2, std::int32_t shape, const Vec<D>& p, std::int64_t near) const {
         Foot<D> best = any_foot<D>(shape);
-        walk<D>(shape, static_cast<std::int32_t>(near), p, best, bound2);
+        if (near != ANY) walk<D>(shape, static_cast<std::int32_t>(near), p, best, bound2);
         if (best.distance2 <= bound2) return true;
         best.distance2 = std::nextafter(bound2, INFINITY);
         search<D>(shape, p, best, bound2);
@@ -111,6 +143,39 @@ class Reference {
         walk<D>(shape, static_cast<std::int32_t>(near), p, best, least2);
         search<D>(shape, p, best, least2);
         return best.distance2;
+    }
+
+    // The largest squared distance from it of its pieces, if their corners (as `corners_`) were elsewhere, in a range of
+    // pieces, beyond `most2`: of corners, or of the middles of pieces and their sides.
+    template <int D>
+    double farthest2(const double* corners, bool of_corners, std::int64_t begin, std::int64_t end, double most2) const {
+        std::int32_t shape = 0;
+        const auto look = [&](std::int64_t piece, const Vec<D>& p) {
+            const double here2 = distance2_beyond<D>(most2, shape, p, piece);
+            if (here2 > most2) most2 = here2;
+        };
+        for (std::int64_t piece = begin; piece < end; ++piece) {
+            while (piece >= first_[shape + 1]) ++shape;
+            const int count = directions_[shape] + 1;  // of corners
+            std::array<Vec<D>, D> at;
+            for (int i = 0; i < D; ++i) at[i] = load<D>(corners + (piece * D + i) * D);
+            if (of_corners) {
+                for (int i = 0; i < count; ++i) look(piece, at[i]);
+                continue;
+            }
+            for (int i = 0; i < (count == 2 ? 1 : D); ++i) {
+                const std::int64_t other = beside_.empty() || count == 2 ? -1 : beside_[piece * 3 + i];
+                if (other < begin || other > piece) look(piece, 0.5 * (at[(i + 1) % D] + at[i]));  // else it was looked at
+            }
+            if constexpr (D == 3) {
+                if (count == 3) {
+                    Vec<3> middle = (at[0] + at[1]) + at[2];
+                    for (double& x : middle) x /= 3.0;
+                    look(piece, middle);
+                }
+            }
+        }
+        return most2;
     }
 
     // The foot, drawn half of the way to its projections to the planes (lines) at the corners of its piece, by its weights:
@@ -198,11 +263,34 @@ class Reference {
     static constexpr std::int32_t LEAF = 4;
     static constexpr int STEPS = 16;
 
+    struct Box {
+        std::array<double, 3> low{INFINITY, INFINITY, INFINITY}, high{-INFINITY, -INFINITY, -INFINITY};
+
+        void include(const Box& other) {
+            for (int k = 0; k < 3; ++k) {
+                low[k] = std::min(low[k], other.low[k]);
+                high[k] = std::max(high[k], other.high[k]);
+            }
+        }
+    };
+
     // The left child is the next node; no right child: a leaf.
     struct Node {
-        std::array<double, 3> low, high;
+        Box box;
         std::int32_t begin, end, right;
     };
+
+    // Those of the pieces, while trees are built.
+    void find_boxes() {
+        boxes_.assign(order_.size(), Box());
+        const std::size_t of_piece = static_cast<std::size_t>(dimension_) * dimension_;
+        for (std::size_t i = 0; i < corners_.size(); ++i) {
+            Box& box = boxes_[i / of_piece];
+            const std::size_t k = i % dimension_;
+            box.low[k] = std::min(box.low[k], corners_[i]);
+            box.high[k] = std::max(box.high[k], corners_[i]);
+        }
+    }
 
     template <int D>
     Vec<D> at(const std::vector<double>& values, std::int64_t piece, int corner) const {
@@ -235,8 +323,10 @@ class Reference {
     bool walk(std::int32_t shape, std::int32_t piece, const Vec<D>& p, Foot<D>& best, double enough2) const {
         if constexpr (D == 3) {
             for (int step = 0; !beside_.empty() && directions_[shape] == 2 && step < STEPS; ++step) {
-                std::array<double, 3> weights;
-                if (!weigh(piece, p, weights)) break;
+                const Vec<3> off = p - at<3>(corners_, piece, 0);
+                const double second = dot(off, slopes_[piece].second), third = dot(off, slopes_[piece].third);
+                const std::array<double, 3> weights{1.0 - second - third, second, third};
+                if (!(second == second)) break;
                 const int least = static_cast<int>(std::min_element(weights.begin(), weights.end()) - weights.begin());
                 if (weights[least] >= 0.0) {
                     take<3>(piece, weights, p, best);
@@ -252,6 +342,21 @@ class Reference {
         }
         look<D>(shape, piece, p, best);
         return false;
+    }
+
+    // How the weights of the second and third corner of a triangle grow in its plane; NaN: it has no area.
+    struct Slopes {
+        Vec<3> second, third;
+    };
+
+    void find_slopes() {
+        slopes_.resize(order_.size());
+        for (std::size_t piece = 0; piece < slopes_.size(); ++piece) {
+            const Vec<3> a = at<3>(corners_, piece, 0), b = at<3>(corners_, piece, 1) - a, c = at<3>(corners_, piece, 2) - a;
+            const Vec<3> normal = cross(b, c);
+            const double area2 = norm2(normal), scale = area2 > 0.0 ? 1.0 / area2 : NAN;
+            slopes_[piece] = {scale * cross(c, normal), scale * cross(normal, b)};
+        }
     }
 
     // The weights of the corners of a triangle at the nearest point of its plane; false: it has no area.
@@ -282,7 +387,7 @@ class Reference {
     static double distance2(const Node& node, const Vec<D>& p) {
         double sum = 0.0;
         for (int k = 0; k < D; ++k) {
-            const double off = std::max({node.low[k] - p[k], p[k] - node.high[k], 0.0});
+            const double off = std::max({node.box.low[k] - p[k], p[k] - node.box.high[k], 0.0});
             sum += off * off;
         }
         return sum;
@@ -291,19 +396,13 @@ class Reference {
     template <int D>
     std::int32_t build(std::int32_t begin, std::int32_t end) {
         const auto number = static_cast<std::int32_t>(nodes_.size());
-        Node node{{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}, begin, end, 0};
-        for (std::int32_t i = begin; i < end; ++i)
-            for (int c = 0; c < D; ++c)
-                for (int k = 0; k < D; ++k) {
-                    const double x = at<D>(corners_, order_[i], c)[k];
-                    node.low[k] = std::min(node.low[k], x);
-                    node.high[k] = std::max(node.high[k], x);
-                }
+        Node node{Box(), begin, end, 0};
+        for (std::int32_t i = begin; i < end; ++i) node.box.include(boxes_[order_[i]]);
         nodes_.push_back(node);
         if (end - begin <= LEAF) return number;
         int axis = 0;
         for (int k = 1; k < D; ++k)
-            if (node.high[k] - node.low[k] > node.high[axis] - node.low[axis]) axis = k;
+            if (node.box.high[k] - node.box.low[k] > node.box.high[axis] - node.box.low[axis]) axis = k;
         const auto centre = [&](std::int32_t piece) { return centres_[static_cast<std::size_t>(piece) * D + axis]; };
         const std::int32_t middle = begin + (end - begin) / 2;
         std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
@@ -360,6 +459,8 @@ class Reference {
     std::vector<std::int32_t> first_, beside_{};  // beside_ (p, 3): the pieces at the sides, -1: none; or empty
     std::vector<std::int32_t> order_, roots_;
     std::vector<Node> nodes_{};
+    std::vector<Box> boxes_{};
+    std::vector<Slopes> slopes_{};  // of the pieces, where searches walk
 };
 
 }  // namespace meshfix

@@ -1,5 +1,10 @@
 // Bindings of what is done with surfaces.
+#include <nanobind/stl/optional.h>
+
+#include <optional>
+
 #include "mesh/python.hpp"
+#include "surface/joints.hpp"
 #include "surface/relocate.hpp"
 
 namespace meshfix {
@@ -23,6 +28,14 @@ auto unfold_py(const Matrix<const double>& points, const Int32s& offsets, const 
                const Matrix<const double>& normals, int threads) {
     const ElementsView elements = flat_elements(offsets, nodes);
     return to_numpy(unlocked([&] { return unfold(points.data(), elements, normals.data(), threads); }), 2);
+}
+
+auto check_unfolded_py(const Matrix<const double>& points, const Int32s& offsets, const Int32s& nodes,
+                       const Matrix<const double>& normals, int threads) {
+    const ElementsView elements = flat_elements(offsets, nodes);
+    if (nodes.shape(0) != 3 * static_cast<std::size_t>(elements.count)) throw nb::value_error("these are no triangles");
+    Validity total = unlocked([&] { return check_unfolded(points.data(), elements, normals.data(), threads); });
+    return std::make_pair(to_numpy(std::move(total.inverted)), total.min_measure);
 }
 
 auto area_vectors_py(const Matrix<const double>& points, const Int32s& offsets, const Int32s& nodes, int threads) {
@@ -52,16 +65,116 @@ auto relocate_on_surface_py(int move, const Matrix<double>& points, const Vector
     return std::make_pair(counts.visited, counts.moved);
 }
 
+void check_vectors(std::size_t numbers, std::size_t vectors) {
+    if (numbers != vectors) throw nb::value_error("the numbers are of other vectors");
+}
+
+auto unit_vectors_py(const Matrix<const double>& vectors) {
+    const std::size_t d = vectors.shape(1);
+    const auto count = static_cast<std::int64_t>(vectors.shape(0));
+    return to_numpy(with_dimension(d, [&](auto dimension) { return unit_vectors<dimension>(vectors.data(), count); }), d);
+}
+
+auto summed_py(const Int32s& group, const Matrix<const double>& vectors, std::int64_t groups, const std::optional<Int32s>& rows) {
+    check_vectors(group.shape(0), rows ? rows->shape(0) : vectors.shape(0));
+    const std::size_t d = vectors.shape(1);
+    const auto count = static_cast<std::int64_t>(group.shape(0));
+    const std::int32_t* which = rows ? rows->data() : nullptr;
+    return to_numpy(with_dimension(d, [&](auto dimension) { return summed<dimension>(group.data(), vectors.data(), which, count, groups); }), d);
+}
+
+auto dots_between_py(const Matrix<const double>& vectors, const Matrix<const std::int32_t>& pairs) {
+    const auto count = static_cast<std::int64_t>(pairs.shape(0));
+    return to_numpy(with_dimension(vectors.shape(1), [&](auto dimension) { return dots<dimension>(vectors.data(), pairs.data(), count); }));
+}
+
+auto sines_between_py(const Matrix<const double>& vectors, const Matrix<const std::int32_t>& pairs) {
+    const auto count = static_cast<std::int64_t>(pairs.shape(0));
+    return to_numpy(with_dimension(vectors.shape(1), [&](auto dimension) { return sines<dimension>(vectors.data(), pairs.data(), count); }));
+}
+
+FacetsView facets_view(const Matrix<const std::int32_t>& facets) {
+    if (facets.shape(1) != 3 && facets.shape(1) != 4) throw nb::value_error("facets have three or four corners");
+    return {facets.data(), static_cast<std::int64_t>(facets.shape(0)), static_cast<int>(facets.shape(1))};
+}
+
+auto joints_py(const Matrix<const std::int32_t>& facets, const Matrix<const std::int32_t>& lines, std::int64_t vertices) {
+    const FacetsView view = facets_view(facets);
+    Joints found = unlocked([&] { return Joints(view, lines.data(), static_cast<std::int64_t>(lines.shape(0)), vertices); });
+    return std::make_tuple(to_numpy(std::move(found.ends), 2), to_numpy(std::move(found.owners)),
+                           to_numpy(std::move(found.edges), 2), to_numpy(std::move(found.order)),
+                           to_numpy(std::move(found.count)), to_numpy(std::move(found.is_line)));
+}
+
+auto fan_normals_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& facets,
+                    const Matrix<const double>& normals, const Int32s& fan) {
+    const FacetsView view = facets_view(facets);
+    const auto corners = static_cast<std::int64_t>(fan.shape(0));
+    return to_numpy(unlocked([&] { return fan_normals(points.data(), view, normals.data(), fan.data(), corners); }), 3);
+}
+
+auto around_pieces_py(const Matrix<const std::int32_t>& triangles, const Matrix<const std::int32_t>& segments,
+                      const Int32s& shape, const Int32s& place, const Vector<const bool>& bounded) {
+    if (triangles.shape(1) != 3 || segments.shape(1) < 2) throw nb::value_error("these are no triangles and segments");
+    check_vectors(shape.shape(0), triangles.shape(0) + segments.shape(0));
+    check_vectors(place.shape(0), shape.shape(0));
+    const Around::Pieces pieces{triangles.data(), segments.data(), static_cast<std::int64_t>(triangles.shape(0)),
+                                static_cast<std::int64_t>(segments.shape(0)), static_cast<int>(segments.shape(1)),
+                                shape.data(), place.data()};
+    const auto vertices = static_cast<std::int64_t>(bounded.shape(0));
+    Around found = unlocked([&] { return Around(pieces, reinterpret_cast<const std::uint8_t*>(bounded.data()), vertices); });
+    return std::make_pair(to_numpy(std::move(found.offsets)), to_numpy(std::move(found.rows), 4));
+}
+
+// Positions in the order of small numbers, equal ones as they come, and where those of each number begin.
+auto counted_order_py(const Int32s& numbers, std::int64_t most) {
+    std::vector<std::int32_t> offsets;
+    auto order = unlocked([&] {
+        return counted_order(static_cast<std::int64_t>(numbers.shape(0)), most, offsets, [&](std::int64_t i) { return numbers.data()[i]; });
+    });
+    return std::make_pair(to_numpy(std::move(order)), to_numpy(std::move(offsets)));
+}
+
+// Marks the vertices on the reference that are farther from it than a bound.
+auto off_reference_py(const Freedom& self, const Matrix<const double>& points, double bound, int threads) {
+    if (points.shape(0) != self.frame.size()) throw nb::value_error("the points are of another mesh");
+    std::vector<std::uint8_t> marks(points.shape(0));
+    with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        for_each_range(static_cast<std::int64_t>(marks.size()), 1024, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t v = begin; v < end; ++v) {
+                const std::int32_t shape = self.frame[v] < 0 ? -1 : self.shape(v);
+                if (shape >= 0)
+                    marks[v] = !self.reference->is_within<D>(bound * bound, shape, load<D>(points.data() + v * D), self.piece(v));
+            }
+        });
+        return 0;
+    });
+    return to_numpy(std::move(marks));
+}
+
 }  // namespace
 
 void bind_surface(nb::module_& m) {
     m.def("unfold", &unfold_py, "points"_a.noconvert(), "offsets"_a.noconvert(), "nodes"_a.noconvert(),
+          "normals"_a.noconvert(), "threads"_a);
+    m.def("check_unfolded", &check_unfolded_py, "points"_a.noconvert(), "offsets"_a.noconvert(), "nodes"_a.noconvert(),
           "normals"_a.noconvert(), "threads"_a);
     m.def("area_vectors", &area_vectors_py, "points"_a.noconvert(), "offsets"_a.noconvert(), "nodes"_a.noconvert(),
           "threads"_a);
     m.def("relocate_on_surface", &relocate_on_surface_py, "move"_a, "points"_a.noconvert(), "states"_a.noconvert(),
           "mesh"_a, "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
           "threads"_a, "freedom"_a, "normals"_a.noconvert());
+    m.def("unit_vectors", &unit_vectors_py, "vectors"_a.noconvert());
+    m.def("summed", &summed_py, "group"_a.noconvert(), "vectors"_a.noconvert(), "groups"_a, "rows"_a.noconvert() = nb::none());
+    m.def("dots_between", &dots_between_py, "vectors"_a.noconvert(), "pairs"_a.noconvert());
+    m.def("sines_between", &sines_between_py, "vectors"_a.noconvert(), "pairs"_a.noconvert());
+    m.def("joints", &joints_py, "facets"_a.noconvert(), "lines"_a.noconvert(), "vertices"_a);
+    m.def("fan_normals", &fan_normals_py, "points"_a.noconvert(), "facets"_a.noconvert(), "normals"_a.noconvert(), "fan"_a.noconvert());
+    m.def("around_pieces", &around_pieces_py, "triangles"_a.noconvert(), "segments"_a.noconvert(), "shape"_a.noconvert(),
+          "place"_a.noconvert(), "bounded"_a.noconvert());
+    m.def("counted_order", &counted_order_py, "numbers"_a.noconvert(), "most"_a);
+    m.def("off_reference", &off_reference_py, "freedom"_a, "points"_a.noconvert(), "bound"_a, "threads"_a);
 }
 
 }  // namespace meshfix

@@ -2,10 +2,12 @@
 // is known of plane elements holds for it. One that is turned over has a negative area there.
 #pragma once
 
+#include <numeric>
 #include <vector>
 
 #include "common/parallel.hpp"
 #include "measures/elements.hpp"
+#include "measures/measures.hpp"
 
 namespace meshfix {
 
@@ -36,26 +38,103 @@ inline Vec<3> area_vector(const std::array<Vec<3>, 4>& p, int nodes) {
     return nodes == 3 ? cross(p[1] - p[0], p[2] - p[0]) : cross(p[2] - p[0], p[3] - p[1]);
 }
 
-// The nodes (sum of nodes, 2), one element behind the other, the first of each at the origin. points (n, 3), normals
-// (elements, 3), none of them zero.
+// LANES triangles from the e-th on, as `unfold_one` has them.
+inline void unfold_triangles(const double* points, const std::int32_t* nodes, const double* normals, double* flat) {
+    const Pack zero = constant<Pack>(0.0), one = constant<Pack>(1.0);
+    std::array<Vec<3, Pack>, 3> p;
+    for (int i = 0; i < 3; ++i)
+        for (int k = 0; k < 3; ++k)
+            p[i][k] = gathered([&](int lane) { return points[static_cast<std::int64_t>(nodes[3 * lane + i]) * 3 + k]; });
+    Vec<3, Pack> normal;
+    for (int k = 0; k < 3; ++k) normal[k] = gathered([&](int lane) { return normals[3 * lane + k]; });
+    const std::array<Vec<3, Pack>, 3> to{p[0] - p[0], p[1] - p[0], p[2] - p[0]};
+    const Vec<3, Pack> area = cross(to[1], to[2]);
+    const Pack size2 = norm2(area);
+    const Vec<3, Pack> scaled = (one / square_root(size2)) * area;
+    Vec<3, Pack> up, size;
+    for (int k = 0; k < 3; ++k) up[k] = select(size2 > zero, scaled[k], normal[k]);
+    const PackMask turned = dot(up, normal) < zero;
+    for (int k = 0; k < 3; ++k) up[k] = select(turned, -one * up[k], up[k]);
+    for (int k = 0; k < 3; ++k) size[k] = select(up[k] < zero, -up[k], up[k]);
+    const PackMask second = size[1] < size[0], third = size[2] < smaller(size[1], size[0]);
+    const Vec<3, Pack> axis{select(third, zero, select(second, zero, one)), select(third, zero, select(second, one, zero)),
+                            select(third, one, zero)};
+    Vec<3, Pack> along = cross(axis, up);
+    along = (one / square_root(norm2(along))) * along;
+    Vec<3, Pack> across = cross(up, along);
+    across = (one / square_root(norm2(across))) * across;
+    for (int i = 0; i < 3; ++i) {
+        const Pack x = dot(along, to[i]), y = dot(across, to[i]);
+        for (int lane = 0; lane < LANES; ++lane) {
+            flat[6 * lane + 2 * i] = x[lane];
+            flat[6 * lane + 2 * i + 1] = y[lane];
+        }
+    }
+}
+
+inline void unfold_one(const double* points, const ElementsView& elements, const double* normals, std::int64_t e, double* flat) {
+    std::array<Vec<3>, 4> nodes{};
+    const int count = load_nodes<3>(points, elements, e, nodes);
+    const Vec<3> normal = load<3>(normals + e * 3), area = area_vector(nodes, count);
+    const double size2 = norm2(area);
+    Vec<3> up = size2 > 0.0 ? (1.0 / std::sqrt(size2)) * area : normal;
+    if (dot(up, normal) < 0.0) up = -1.0 * up;
+    const Plane plane(up);
+    for (int i = 0; i < count; ++i) {
+        const Vec<2> x = plane.coordinates(nodes[i] - nodes[0]);
+        std::copy(x.begin(), x.end(), flat + 2 * i);
+    }
+}
+
+// Elements from `begin` to `end`: their nodes, one element behind the other, the first of each at the origin.
+inline void unfold_range(const double* points, const ElementsView& elements, const double* normals, std::int64_t begin,
+                         std::int64_t end, double* flat) {
+    const auto first = [&](std::int64_t e) { return elements.offsets[e] - elements.offsets[begin]; };
+    std::int64_t e = begin;
+    while (e < end) {
+        if (e + LANES <= end && first(e + LANES) - first(e) == 3 * LANES) {  // none has fewer
+            unfold_triangles(points, elements.nodes + elements.offsets[e], normals + e * 3, flat + 2 * static_cast<std::int64_t>(first(e)));
+            e += LANES;
+        } else {
+            unfold_one(points, elements, normals, e, flat + 2 * static_cast<std::int64_t>(first(e)));
+            ++e;
+        }
+    }
+}
+
+// The nodes (sum of nodes, 2) of all. points (n, 3), normals (elements, 3), none of them zero.
 inline std::vector<double> unfold(const double* points, const ElementsView& elements, const double* normals, int threads) {
     std::vector<double> flat(static_cast<std::size_t>(elements.offsets[elements.count]) * 2);
     for_each_range(elements.count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-        std::array<Vec<3>, 4> nodes{};
-        for (std::int64_t e = begin; e < end; ++e) {
-            const int count = load_nodes<3>(points, elements, e, nodes);
-            const Vec<3> normal = load<3>(normals + e * 3), area = area_vector(nodes, count);
-            const double size2 = norm2(area);
-            Vec<3> up = size2 > 0.0 ? (1.0 / std::sqrt(size2)) * area : normal;
-            if (dot(up, normal) < 0.0) up = -1.0 * up;
-            const Plane plane(up);
-            for (int i = 0; i < count; ++i) {
-                const Vec<2> x = plane.coordinates(nodes[i] - nodes[0]);
-                std::copy(x.begin(), x.end(), flat.begin() + static_cast<std::int64_t>(elements.offsets[e] + i) * 2);
-            }
-        }
+        unfold_range(points, elements, normals, begin, end, flat.data() + 2 * static_cast<std::int64_t>(elements.offsets[begin]));
     });
     return flat;
+}
+
+// What `check` finds of triangles that are unfolded, a few at a time.
+inline Validity check_unfolded(const double* points, const ElementsView& triangles, const double* normals, int threads) {
+    constexpr std::int64_t FEW = 1024;
+    std::array<std::int32_t, 3 * FEW> numbers;
+    std::iota(numbers.begin(), numbers.end(), 0);
+    std::vector<Validity> parts(triangles.count / PER_ITEM + 1);
+    for_each_range(triangles.count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
+        std::vector<double> flat(6 * FEW);
+        for (std::int64_t first = begin; first < end; first += FEW) {
+            const std::int64_t count = std::min(FEW, end - first);
+            unfold_range(points, triangles, normals, first, first + count, flat.data());
+            Validity part;
+            for (std::int64_t s = 0; s < count; s += LANES) {
+                const Edges<2, Pack> e = lanes_of<2>(flat.data(), numbers.data(), s, count);
+                look_at<2>(part, flat.data(), numbers.data(), s, count, e, determinant(e));
+            }
+            for (std::int32_t& s : part.inverted) s += static_cast<std::int32_t>(first);
+            add(parts[item], part);
+        }
+    });
+    Validity total;
+    for (const Validity& part : parts) add(total, part);
+    total.min_measure /= factorial(2);
+    return total;
 }
 
 // The area of each element (count, 3) as a vector, in the units of points.

@@ -218,7 +218,7 @@ class Reference {
         waiting[count++] = roots_[shape];
         while (count > 0) {
             const Node& node = nodes_[waiting[--count]];
-            if (skip(load<D>(node.low.data()), load<D>(node.high.data()))) continue;
+            if (skip(load<D>(node.box.low.data()), load<D>(node.box.high.data()))) continue;
             if (node.right == 0) {
                 for (std::int32_t i = node.begin; i < node.end; ++i)
                     if (!look(order_[i])) return false;

@@ -365,7 +365,8 @@ class Run(Positions):
     def _mendings(self, phase: Phase, near: Mask) -> Iterator[Array]:
         """Yield sweeps around what is below the goal, turn by turn, as long as that becomes less or better."""
         self.floor = self.min_measure
-        goal = min(GOAL[self.points.shape[1]] * self.threshold, math.pi / 2)
+        dimension = self.points.shape[1] - (self.surface is not None)
+        goal = min(GOAL[dimension] * self.threshold, math.pi / 2)
         fewest, largest, waited = self.count, -math.inf, 0
         angles = self._angles(self.points)
         well = self._least(angles) >= self.threshold and not (self.many and self.untangling > EASY)

@@ -93,13 +93,13 @@ class Mesh:
         if isinstance(blocks, np.ndarray):
             rows = _checked_simplices(p, blocks, threads)
             used = kernels.used_vertices(rows, len(p))
-            _check_coordinates(p, used)
+            check_coordinates(p, used)
             topology = build_topology(p, rows, used, threads)
         else:
             _check_shape(p)
             checked = checked_blocks(blocks, *p.shape)
             used = kernels.used_vertices(np.concatenate([rows.reshape(-1, 1) for _, rows in checked]), len(p))
-            _check_coordinates(p, used)
+            check_coordinates(p, used)
             topology = build_mixed(p, checked, used, threads)
         movable = topology.used & ~topology.boundary
         if fixed is not None:
@@ -348,7 +348,8 @@ def _checked_simplices(
     return rows
 
 
-def _check_coordinates(points: NDArray[np.float64], used: NDArray[np.int32]) -> None:
+def check_coordinates(points: NDArray[np.float64], used: NDArray[np.integer]) -> None:
+    """Raise InvalidMeshError where some points cannot be computed with."""
     corners = points if len(used) == len(points) else np.take(points, used, axis=0)
     finite = np.isfinite(corners)
     if not finite.all():

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError, listed
 from meshfix_cli.mesh.elements import ELEMENTS, counted, words
+from meshfix_cli.mesh.mesh import check_coordinates
 from meshfix_cli.mesh.quadratic import Quadratic, is_judged
 from meshfix_cli.meshfile.solved import Part
 
@@ -70,6 +71,7 @@ def quadratic_of(
     boundary = _on_facets(mesh, ties, [None])
     between = _on_facets(mesh, ties, regions)
     quadratic = Quadratic(blocks, mesh.topology.n, np.concatenate(rows), ties)
+    check_coordinates(mesh.points, np.flatnonzero(quadratic.used))
     return quadratic.holding(boundary | between | on_cells | other, boundary & ~other)
 
 

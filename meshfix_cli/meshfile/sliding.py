@@ -78,7 +78,11 @@ def held_back(document: Document, after: Mesh, feature_angle: float) -> Iterator
     if mesh.freedom.shapes is None or mesh.freedom.shapes.folds or mesh.surface is not None:  # folds feign edges
         return
     inverted = after.judged().check(after.along_curve(after.points), 1)[0]
-    bound = np.append(mesh.along_curve(~mesh.movable) | (mesh.freedom.degrees == 1), False)
+    corners = mesh.topology.boundary & mesh.topology.of_vertices(mesh.freedom.frame < 0)
+    for reason, mask in document.holds.items():
+        if reason not in (ON_BOUNDARY, ON_CELLS):
+            corners = corners & ~mask
+    bound = np.append(mesh.along_curve(corners) | (mesh.freedom.degrees == 1), False)
     at_features = np.zeros(mesh.topology.m, dtype=bool)
     for block in mesh.topology.blocks:
         at_features[block.rows] = bound[mesh.topology.number[block.vertices]].any(axis=1)

@@ -205,7 +205,9 @@ def _exclusive(
     lost = lost[mesh.topology.owners(np.arange(len(stars.simplices), dtype=np.int32))]
     vertices = distinct(corners[movable[corners]])
     together, alone = kernels.exclusive(points, stars, movable, lost, vertices, threads, freedom)
-    return mesh.topology.owners(together), mesh.topology.owners(alone)
+    wrong, alone = np.zeros(mesh.topology.m, dtype=bool), mesh.topology.owners(alone)
+    wrong[mesh.topology.owners(inverted)] = True
+    return mesh.topology.owners(together), alone[wrong[alone]]
 
 
 def _distinct_pairs(pairs: NDArray[np.int32]) -> NDArray[np.int32]:

@@ -11,6 +11,7 @@ import pytest
 from bent import HIGHER, curved, straight
 from commands import error_line, run
 from monomials import positions
+from numpy.typing import NDArray
 from programs import gmsh_session
 from refined import refined
 from written import by_gmsh, by_vtk
@@ -18,10 +19,18 @@ from written import by_gmsh, by_vtk
 from meshfix_cli import read
 from meshfix_cli.mesh.elements import element_of
 from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.mesh.lagrange import Kind
 from meshfix_cli.mesh.quadratic import Array
+from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.repair import Method
 
 SOME = ("plate, 8 holes of 0.1", "ring 0.95", "wing 0.05", "cube, 1 bubbles of 0.1")
+
+
+def lagrange_square(order: int) -> tuple[Array, NDArray[np.int32]]:
+    """A straight quadrilateral of an order, its nodes in the order of VTK."""
+    places = np.array(Kind("quad", order, True).places()) / order
+    return places, np.arange(len(places), dtype=np.int32)[None]
 
 
 def written(path: Path, key: str, points: Array) -> None:
@@ -124,3 +133,21 @@ def test_types_that_are_not_judged_are_named(tmp_path: Path) -> None:
     blocks.append(("triangle9", np.arange(9, dtype=np.int32)[None]))
     by_gmsh(tmp_path / "in.msh", nodes, blocks)
     assert "1 of 1 element is curved (triangles of 9 nodes)" in error_line("quality", tmp_path / "in.msh")
+
+
+def test_nothing_is_proved_of_the_highest_orders(tmp_path: Path) -> None:
+    """Rounding would have a part in it: the inner nodes have valid positions, as the straight element shows."""
+    points, rows = lagrange_square(10)
+    inside = np.asarray(((points > 0) & (points < 1)).all(axis=1))
+    moved = points + inside[:, None] * np.random.default_rng(0).normal(0, 0.02, points.shape)
+    by_vtk(tmp_path / "in.vtu", np.column_stack([moved, np.zeros(len(moved))]), [("quad121", rows)])
+    found = read(tmp_path / "in.vtu").mesh
+    assert found.check()[0] == 1
+    assert not len(find_obstacles(found).inverted)
+
+
+def test_a_node_far_away_is_refused_as_a_corner_is(tmp_path: Path) -> None:
+    points, rows = lagrange_square(3)
+    points[-1] = 1e300
+    by_vtk(tmp_path / "in.vtu", np.column_stack([points, np.zeros(len(points))]), [("quad16", rows)])
+    assert "coordinates beyond" in error_line("quality", tmp_path / "in.vtu")

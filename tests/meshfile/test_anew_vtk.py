@@ -147,6 +147,18 @@ def test_odd_names_and_types_of_numbers(form: Format) -> None:
 
 
 @each_form
+def test_vtk_reads_cells_of_one_type(form: Format, tmp_path: Path) -> None:
+    """Connectivity has one column, also where all cells have equally many points."""
+    (tmp_path / "in.off").write_text("OFF\n4 2 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n3 0 1 2\n3 0 2 3\n")
+    document = read(tmp_path / "in.off")
+    path = tmp_path / ("out.vtu" if form.name == "vtu" else "out.vtk")
+    path.write_bytes(anew.written(document.source, document.source.points, form))
+    grid = in_vtk(path)
+    assert grid.GetNumberOfCells() == 2
+    assert [grid.GetCell(1).GetPointId(k) for k in range(3)] == [0, 2, 3]
+
+
+@each_form
 def test_files_of_other_formats_become_such(form: Format, tmp_path: Path) -> None:
     """With their groups, and in the same bytes each time."""
     for reader, variant in (("abaqus", "sets.inp"), ("gmsh", "groups_text_4.msh"), ("exodus", "")):

@@ -415,16 +415,16 @@ def test_nodes_of_curved_cells_come_in_the_order_of_vtk(
     np.testing.assert_array_equal(points[len(corners) :], [points[between].mean(axis=0) for between in EDGES[name]])
 
 
-@pytest.mark.parametrize(
-    "data",
-    [
-        text_2(elements=FAN + "5 34 2 1 1 4 1 2 3 4\n"),
-        text_4(kind=35),
-        text_4(kind=999),
-    ],
-)
-def test_what_is_left_to_meshio(data: bytes) -> None:
-    assert gmsh.parse(data) is None
+@pytest.mark.parametrize("data", [text_2(elements=FAN + "5 34 2 1 1 4 1 2 3 4\n"), text_4(kind=35), text_4(kind=999)])
+def test_types_that_are_not_known(data: bytes) -> None:
+    with pytest.raises(ReadError, match="elements of the type"):
+        gmsh.parse(data)
+
+
+@pytest.mark.parametrize("line", FAN.splitlines())
+def test_an_element_with_too_few_numbers(line: str) -> None:
+    with pytest.raises(ReadError):
+        gmsh.parse(text_2(elements=FAN.replace(line, line[:-2])))
 
 
 @pytest.mark.parametrize("version", ["1", "3", "4.0", "5.0"])

@@ -286,6 +286,22 @@ def test_the_boundary_of_elements_with_nodes_of_their_own_is_held() -> None:
     np.testing.assert_array_equal(source.held.reshape(-1, 3), np.isin(cells, surface(cells)))
 
 
+ONE = b"""MFEM mesh v1.0
+dimension
+2
+elements
+%s
+vertices
+4
+nodes
+FiniteElementSpace
+FiniteElementCollection: %s
+VDim: 2
+Ordering: 1
+0 0
+"""
+
+
 @pytest.mark.parametrize(
     ("data", "words"),
     [
@@ -306,6 +322,12 @@ def test_the_boundary_of_elements_with_nodes_of_their_own_is_held() -> None:
         (text(*block(), nodes(block()[0], 1, "L2_T2_3D_P4")).encode(), "has nodes in the space L2_T2_3D_P4"),
         (text(*block(), nodes(block()[0], 1, "L2_3D_P1")).encode(), "has nodes in the space L2_3D_P1"),
         (text(*block(), nodes(block()[0][:-1], 1, "H1_3D_P1")).encode(), "is truncated"),
+        (ONE % (b"1\n1 3 0 1 2 3", b"L2_T1_2D_P0"), "has nodes in the space L2_T1_2D_P0"),
+        (ONE % (b"1\n1 3 0 1 2 3", b"H1_2D_P0"), "has nodes in the space H1_2D_P0"),
+        (ONE % (b"1\n1 3 0 1 2 3", b"H1_2D_P2000"), "has nodes of order 2000"),
+        (ONE % (b"1\n1 0 0", b"L2_T1_2D_P2"), "has nodes of its own for each vertex"),
+        (ONE % (b"0", b"H1_2D_P2"), "has no elements"),
+        (ONE.replace(b"elements", b"boundary") % (b"0", b"H1_2D_P2"), "nodes stand before the elements"),
     ],
 )
 def test_what_is_not_read_is_named(data: bytes, words: str) -> None:

@@ -15,6 +15,7 @@ constexpr int BEZIER_DEPTH = 60;    // halvings of a hexahedron: 20 in each dire
 constexpr int BEZIER_PARTS = 4096;  // of it that are looked at; what is not decided then is not valid
 constexpr int HELD_DEPTH = 8;       // halvings of a piece of a curve or surface on which a vertex has a place, or none
 constexpr int QUADRATIC_PARTS = 4096;  // the same of a curved element
+constexpr int QUADRATIC_PROVED = 6;    // the highest order of which anything is proved: beyond, rounding has a part in it
 
 // Linear programme. All are relative to the largest number of their kind in the star.
 constexpr double LP_DROPPED_FACE2 = 1e-24;  // |n|^2 below which co-located neighbours leave the star

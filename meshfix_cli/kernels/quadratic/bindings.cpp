@@ -25,6 +25,10 @@ void init_type(QuadraticType* self, const std::vector<int>& factors, int order, 
     for (std::size_t i = 0; i < places.shape(0); ++i)
         shape.places.emplace_back(places.data() + i * places.shape(1), places.data() + (i + 1) * places.shape(1));
     if (places.shape(0) > AnyOrder::NODES) throw nb::value_error("the type has too many nodes");
+    std::size_t controls = 1;
+    for (const int factor : factors)
+        for (int k = 1; k <= factor; ++k) controls = controls * static_cast<std::size_t>(order + k) / static_cast<std::size_t>(k);
+    if (order > 2 && places.shape(0) != controls) throw nb::value_error("the type has not as many nodes as control points");
     new (self) QuadraticType(shape);
     const auto differences = [self](int j) { return static_cast<int>(self->difference[j].size()); };
     if (self->coefficients > AnyOrder::COEFFICIENTS || self->normals > AnyOrder::NORMALS ||

@@ -30,6 +30,7 @@ class QuadraticProofs {
             const QuadraticParts<D, R> parts(mesh_->type(e), mesh_->local<D, R>(points_, e));
             if (judge(parts) == Verdict::valid) continue;
             if (cannot_be_valid(e, parts)) found_[e] = 1;
+            if (parts.type->order > QUADRATIC_PROVED) continue;
             for (int k = 0; k < parts.type->nodes; ++k) {
                 const std::int32_t v = mesh_->nodes_of(e)[k];
                 if (free_[v] && !seen[v]) nodes.push_back(v);
@@ -52,6 +53,7 @@ class QuadraticProofs {
     bool cannot_be_valid(std::int32_t e, const QuadraticParts<D, R>& parts) const {
         const NodeSet free = mesh_->marked(free_, e);
         if (!free.any()) return true;
+        if (parts.type->order > QUADRATIC_PROVED) return false;
         for (const auto& [place, depends] : mesh_->type(e).places())
             if (!(depends & free).any() && !(value(place, parts) > bound(place, parts))) return true;
         return false;
@@ -119,8 +121,9 @@ class QuadraticProofs {
 
     // Adds det J at places of an element as functions of one of its nodes, by the lengths of its edges.
     void add(std::int32_t e, int node, const std::vector<const Sum*>& places) {
-        if (places.empty() || found_[e] == 1) return;  // with what is hopeless nothing else has to agree
         const QuadraticType& type = mesh_->type(e);
+        // With what is hopeless nothing else has to agree.
+        if (places.empty() || found_[e] == 1 || type.order > QUADRATIC_PROVED) return;
         const QuadraticParts<D, R> parts(type, mesh_->local<D, R>(points_, e));
         const double scale = type.doubt / parts.doubt();
         if (!(scale < INFINITY)) return;

@@ -39,7 +39,7 @@ def written(content: Content, form: Format) -> bytes:
     kinds = grid.kinds()
     corners = grid.vertices if text else [np.concatenate([rows.ravel() for rows in grid.vertices])]
     cells = [
-        arrays.element("connectivity", *corners), arrays.element("offsets", grid.offsets()),
+        arrays.element("connectivity", *corners, scalars=True), arrays.element("offsets", grid.offsets()),
         arrays.element("types", kinds),
     ]  # fmt: skip
     parts = [
@@ -68,10 +68,10 @@ class _Arrays:
         parts = [self.element(names[name], values, more=more) for name, values in arrays.items()]
         return f"<{tag}>\n".encode() + b"".join(parts) + f"</{tag}>\n".encode() if parts else b""
 
-    def element(self, name: str, *tables: NDArray[Any], more: str = "") -> bytes:
-        """Return the element of an array; text may come in several parts."""
+    def element(self, name: str, *tables: NDArray[Any], more: str = "", scalars: bool = False) -> bytes:
+        """Return the element of an array; text may come in several parts, and scalars in rows."""
         (values, *_) = tables
-        columns = values.shape[1] if len(tables) == 1 and values.ndim > 1 else 1
+        columns = values.shape[1] if len(tables) == 1 and values.ndim > 1 and not scalars else 1
         said = f' NumberOfComponents="{columns}"' if columns > 1 else ""
         head = f'<DataArray type="{_NAMES[values.dtype.str[1:]]}" Name={quoteattr(name)}{said}{more} format='
         if self.text:

@@ -27,7 +27,7 @@ SETS, ENTITY = "gmsh:physical_set", "gmsh:geometrical"
 
 
 def parse(data: bytes) -> Source | None:
-    """Read nodes and elements; None: another version, or elements such as polygons."""
+    """Read nodes and elements; None: numbers of another size."""
     try:
         file = read(data)
     except UnknownError:

@@ -333,8 +333,10 @@ def _spread(begin: Int64, count: Int64, step: Int64) -> Int64:
 
 
 def _nodes_of(kind: int) -> int:
-    if kind not in TYPES:
-        raise UnknownError
+    if kind not in TYPES:  # no other reader knows more of them
+        raise ReadError(
+            f"has elements of the type {kind}, which is not known, or an element with too few or too many numbers"
+        )
     return TYPES[kind][1]
 
 

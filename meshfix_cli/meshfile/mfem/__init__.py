@@ -33,15 +33,14 @@ _SPACE = re.compile(
 )
 # Spaces of functions whose values are those at the nodes. Of the first order those of all H1 are; U and T4: they are
 # evenly spaced, and else at the points of Gauss and Lobatto.
-_SHARED = re.compile(r"Linear|Quadratic|H1\w*?(?:@.)?_\dD_P1|H1(?:@(?P<even>U)|@G)?_\dD_P\d+")
-_APART = re.compile(r"L2_T(?:1|(?P<even>4))_\dD_P\d+")
-_ORDERS = {"Linear": 1, "Quadratic": 2, "Cubic": 3}
+_SHARED = re.compile(r"Linear|Quadratic|H1\w*?(?:@.)?_\dD_P1|H1(?:@(?P<even>U)|@G)?_\dD_P(?P<order>[1-9]\d*)")
+_APART = re.compile(r"L2_T(?:1|(?P<even>4))_\dD_P(?P<order>[1-9]\d*)")
 _KINDS = {"NURBS": "a NURBS mesh", "NC": "a nonconforming mesh (NC)", "INLINE": "a mesh that is to be made (INLINE)"}
 _TYPES = {
     0: ("vertex", 1), 1: ("line", 2), 2: ("triangle", 3), 3: ("quad", 4), 4: ("tetra", 4), 5: ("hexahedron", 8),
     6: ("wedge", 6), 7: ("pyramid", 5),
 }  # fmt: skip
-_PYRAMID = 7
+_VERTEX, _PYRAMID = 0, 7
 _ATTRIBUTE = "mfem:attribute"
 
 
@@ -156,21 +155,25 @@ def _read_nodes(mesh: _Mesh, text: bytes, at: int) -> int:
     Raises
     ------
     ReadError
-        It is of another space than that of the vertices, or that of the corners of each element.
+        It is of a space that is not read, stands before the elements, or is of elements without such nodes.
     """
     space = _SPACE.match(text, at)
     if space is None:
         raise in_line(text, at, "the space of the nodes is not readable")
     name = space[1].decode("latin-1")
-    mesh.order = _order_of(name)
     kind = _SHARED.fullmatch(name) or _APART.fullmatch(name)
     if kind is None:
         raise ReadError(f"has nodes in the space {name}, which are not read")
+    mesh.order = int(kind["order"] or 1 + (name == "Quadratic"))
+    if mesh.n > len(text):
+        raise ReadError(f"is truncated: {mesh.n:,} rows are announced")
     if mesh.order > HIGHEST:
         raise ReadError(f"has nodes of order {mesh.order}, which are not read")
     mesh.apart, mesh.lobatto = kind.re is _APART, kind["even"] is None and mesh.order > 2
     n, d = (_own(mesh) if mesh.apart else mesh.n), int(space[2])
     if mesh.order > 1 and not mesh.apart:
+        if not len(_sizes(mesh)[1]):
+            raise ReadError("has no elements")
         cells = _linear(mesh, "elements"), _linear(mesh, "boundary")
         mesh.nodes, n = higher_order(mesh.n, mesh.order, *cells, mesh.lobatto)
     by_component = space[3] == b"0"
@@ -179,17 +182,12 @@ def _read_nodes(mesh: _Mesh, text: bytes, at: int) -> int:
     return at
 
 
-def _order_of(name: str) -> int:
-    """Return the order of a space."""
-    found = re.search(r"_P(\d{1,3})$", name)
-    return int(found[1]) if found else _ORDERS.get(name, 1)
-
-
 def _own(mesh: _Mesh) -> int:
     """Return how many nodes elements have that have each its own."""
     types = _sizes(mesh)[1]
-    if (types == _PYRAMID).any():
-        raise ReadError("has nodes of its own for each pyramid, which are not read")
+    for kind in np.unique(types).tolist():
+        if kind in (_VERTEX, _PYRAMID):
+            raise ReadError(f"has nodes of its own for each {_TYPES[kind][0]}, which are not read")
     return sum(len(own_nodes(_TYPES[kind][0], mesh.order)) for kind in types.tolist())
 
 

@@ -67,7 +67,7 @@ class Document:
     arbitrary : (m,) bool or None
         The elements that are numbered the other way round, where the file's numbering says nothing of that.
     ties : Ties or None
-        Which nodes lie between the corners of elements of second order, and follow these; None: there are none.
+        Which nodes lie between the corners of elements, and follow these; None: there are none.
     displaced : (n, d) float or None
         Where the points are after a displacement, as the file holds them; None: where the file has them.
     """

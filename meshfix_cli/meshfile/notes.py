@@ -22,7 +22,7 @@ _CURVED = (
     "elements are curved, and are judged so; angles and their ceilings are of straight ones, and curved facets may meet"
 )
 _CURVED_SURFACE = (
-    "elements of second order are judged as the straight ones of their corners; those that are curved stay"
+    "elements with more nodes than corners are judged as the straight ones of their corners; those that are curved stay"
 )
 
 

@@ -1,6 +1,6 @@
 """What is solved for of the cells of a file: all elements of its highest dimension, by their corners.
 
-Those of second order have more nodes than corners; where these lie between the corners, they follow them. Cells that
+Some have more nodes than corners; where these lie between the corners, they follow them. Cells that
 other programs number in their own way, pixels, voxels and strips of triangles, become what they are, and so
 do cells that name a vertex several times: a hexahedron of which two opposite faces have lost an edge is a wedge.
 

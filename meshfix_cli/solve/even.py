@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.solve.foldover import evened
 from meshfix_cli.solve.region import Region
-from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped, sharply_shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
@@ -41,7 +41,7 @@ def evened_where_poor(
 ) -> Iterator[Array]:
     """Yield the points (n, d) with even sizes and then the best shape, where scaled Jacobians are poor.
 
-    First as all corners judge it, then as the worst ones do, which leads farther.
+    From the evened one, first as all corners judge it, then as the worst ones do.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def evened_where_poor(
     if smallest < (POOR_OF_UNEVEN if uneven else POOR) * min(mean, ceiling(points, stars, free)):
         even = evened(points, stars, free, threads, ITERATIONS, freedom)
         yield shaped(even, stars, free, goal, threads, FEW_ITERATIONS, freedom)
-        held = replace(goal, floor=math.degrees(math.asin(smallest)) + LIFT)
-        yield sharply_shaped(even, stars, free, held, threads, SHARP_ITERATIONS, freedom)
+        held = replace(goal, floor=math.degrees(math.asin(smallest)) + LIFT, sharp=True)
+        yield shaped(even, stars, free, held, threads, SHARP_ITERATIONS, freedom)
 
 
 def ceiling(points: Array, mesh: kernels.Connectivity, free: Mask) -> float:

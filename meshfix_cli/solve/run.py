@@ -16,7 +16,7 @@ from meshfix_cli import kernels
 from meshfix_cli.solve.passes import Passes
 from meshfix_cli.solve.positions import ANGLE_STEPS, GAIN, Positions, Start
 from meshfix_cli.solve.records import SweepRecord
-from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, Goal, shaped, sharply_shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, Goal, shaped
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
 
 if TYPE_CHECKING:
@@ -279,11 +279,10 @@ class Run(Positions):
         floor = math.degrees(smallest) if phase.shapes in ("lost", "sharp") else 0.0
         most = self.pace.iterations if phase.shapes == "risen" else ITERATIONS
         most = FEW_ITERATIONS if phase.elements and phase.shapes == "first" else most
-        aims = Goal(goal, floor, max(self.min_measure, 0.0))
-        minimised = sharply_shaped if phase.shapes == "sharp" else shaped
+        aims = Goal(goal, floor, max(self.min_measure, 0.0), sharp=phase.shapes == "sharp")
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
-            yield minimised(points, stars, free, aims, self.threads, most, self.team.freedom)
+            yield shaped(points, stars, free, aims, self.threads, most, self.team.freedom)
 
         yield from self._of_whole(compute, self.points, self._smoothed(phase) & self.together)
 

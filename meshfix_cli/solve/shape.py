@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 
 ITERATIONS = 100  # of "best"
 FEW_ITERATIONS = 20  # of the default
-SHARPNESS = 15.0  # of their judgement: see kernels/moves/shape.hpp
-# What mean ratios are worth beside that, one minimisation after the other: without them there are many valleys.
-EVENNESSES = (8.0, 2.4, 0.8, 0.24, 0.0)
+# Sharpness and evenness of minimisations, one after the other: how much more worst corners count, and what their mean
+# ratios are worth where scaled Jacobians are worth 1; see kernels/moves/shape.hpp. Without these are many valleys.
+PLAIN = ((0.0, 0.0),)
+SHARP = tuple((15.0, evenness) for evenness in (8.0, 2.4, 0.8, 0.24, 0.0))
 ANGLE_OF_SLIDING = 1.0  # what a degree is worth where the boundary slides: its elements gain more in angles
 WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
 SHARP_WEIGHT = 3.0  # of a corner, where elements are judged by their worst ones
@@ -39,17 +40,14 @@ class Goal:
         Degrees; smaller angles count much more.
     measure : float
         Model units; no measure gets smaller.
-    sharpness : float
-        0: all corners of an element count the same; the larger, the more do the worst ones.
-    evenness : float
-        What the mean ratios of corners of elements are worth, where their scaled Jacobians are worth 1.
+    sharp : bool
+        Whether elements are judged by their worst corners; else all corners of one count the same.
     """
 
     angle: float
     floor: float = 0.0
     measure: float = 0.0
-    sharpness: float = 0.0
-    evenness: float = 0.0
+    sharp: bool = False
 
 
 def shaped(
@@ -79,29 +77,16 @@ def shaped(
         Where the free vertices may go.
     """
     region = Region(mesh, free)
-    moved = points.copy()
-    weight = SHARP_WEIGHT if goal.sharpness else WEIGHT
-    moved[region.moving] = kernels.shaped(
-        points[region.vertices], region.simplices, corner_weights(mesh, region), _owners(mesh, region),
-        len(region.moving), goal.angle, goal.floor, goal.measure, weight, goal.sharpness, goal.evenness,
-        iterations, threads, *() if freedom is None else (freedom.of(region.moving), ANGLE_OF_SLIDING),
-    )  # fmt: skip
-    return region.retreated(points, moved, goal.measure, threads)
-
-
-def sharply_shaped(
-    points: Array,
-    mesh: kernels.Connectivity,
-    free: NDArray[np.bool_],
-    goal: Goal,
-    threads: int,
-    iterations: int = ITERATIONS,
-    freedom: Freedom | None = None,
-) -> Array:
-    """Return the points (n, d) where elements are best as their worst corners judge them; see `shaped`."""
-    for evenness in EVENNESSES:
-        aims = replace(goal, sharpness=SHARPNESS, evenness=evenness)
-        points = shaped(points, mesh, free, aims, threads, iterations, freedom)
+    weights, owners = corner_weights(mesh, region), _owners(mesh, region)
+    weight, stages = (SHARP_WEIGHT, SHARP) if goal.sharp else (WEIGHT, PLAIN)
+    sliding = () if freedom is None else (freedom.of(region.moving), ANGLE_OF_SLIDING)
+    for sharpness, evenness in stages:
+        moved = points.copy()
+        moved[region.moving] = kernels.shaped(
+            points[region.vertices], region.simplices, weights, owners, len(region.moving), goal.angle, goal.floor,
+            goal.measure, weight, sharpness, evenness, iterations, threads, *sliding,
+        )  # fmt: skip
+        points = region.retreated(points, moved, goal.measure, threads)
     return points
 
 

@@ -11,7 +11,7 @@ from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.solve.compared import KEPT
 from meshfix_cli.solve.even import ceiling
-from meshfix_cli.solve.shape import Goal, sharply_shaped
+from meshfix_cli.solve.shape import Goal, shaped
 
 
 def tangled(name: str, how: str) -> Mesh:
@@ -89,7 +89,7 @@ def test_edges_that_have_shrunk_grow_again() -> None:
     away = np.linalg.norm(points - middle, axis=1, keepdims=True) / h
     start = np.where(free[:, None], middle + (points - middle) * np.minimum(1, (away / 3) ** 3), points)
     assert mesh.with_vertices(start).check()[0] == 0
-    after = sharply_shaped(start, stars, free, Goal(30.0), 1)
+    after = shaped(start, stars, free, Goal(30.0, sharp=True), 1)
     assert mesh.with_vertices(after).check()[0] == 0
     assert corners(mesh.with_vertices(after)).mean() > 0.999 > corners(mesh.with_vertices(start)).mean()
     shortest = [np.linalg.norm(one[edges[0]] - one[edges[1]], axis=1).min() for one in (start, after)]

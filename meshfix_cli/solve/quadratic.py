@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -112,6 +112,7 @@ class _Seen(NamedTuple):
     low: Mask
     left: int
     smallest: float
+    jacobians: Array  # the smallest scaled one at a node
 
 
 class _Run:
@@ -133,7 +134,7 @@ class _Run:
     def _seen(self, points: Array) -> _Seen:
         found = self.mesh.judge(points, self.limits.threads)
         invalid, smallest = found.verdicts != VALID, float(found.smallest.min(initial=math.inf))
-        return _Seen(points, invalid, found.smallest <= 0, int(invalid.sum()), smallest)
+        return _Seen(points, invalid, found.smallest <= 0, int(invalid.sum()), smallest, found.scaled_jacobians)
 
     def _rank(self, seen: _Seen) -> tuple[int, float]:
         """Smaller is better: fewer invalid elements, then larger coefficients of those that depend on a free node."""
@@ -197,20 +198,22 @@ class _Run:
 
     def raise_to(self, highest: float) -> Iterator[Step]:
         """Raise the smallest coefficients, those of nodes first; elements that held nodes keep low are left out."""
-        self.least = self.mesh.kernel.sizes(self.points, self.limits.threads)
+        sizes = self.mesh.kernel.sizes(self.points, self.limits.threads)
         for free in (self.free & ~self.mesh.corners, self.free):
-            if free is not self.free or self.now.smallest < POOR or highest == 1:
-                self.refused = False
-                yield from self._raise(free, highest)
-                if self.refused:
-                    yield from self._raise(free, highest, patient=True)
+            if free is self.free and self.now.smallest >= POOR and highest != 1:
+                return
+            if (yield from self._raise(free, highest, sizes)):
+                yield from self._raise(free, highest, sizes, patient=True)
 
-    def _raise(self, free: Mask, highest: float, patient: bool = False) -> Iterator[Step]:
-        """Raise coefficients step by step; patient: what costs too much is not taken, but gone on from."""
-        step, floor, kept, quality = STEP, STEP, self.now, self._quality(self.now)
+    def _raise(self, free: Mask, highest: float, sizes: Array, patient: bool = False) -> Generator[Step, None, bool]:
+        """Raise coefficients step by step, relative to sizes (m,) at least; return whether any cost too much.
+
+        Patient: that is not taken, but gone on from.
+        """
+        step, floor, kept, quality, refused = STEP, STEP, self.now, self._quality(self.now), False
         while floor < highest and step >= LEAST_STEP:
-            sizes = self.mesh.kernel.sizes(self.points, self.limits.threads)
-            self.rest, self.sizes = self.points, np.maximum(sizes, self.least)
+            straight = self.mesh.kernel.sizes(self.points, self.limits.threads)
+            self.rest, self.sizes = self.points, np.maximum(straight, sizes)
             stuck = self._smallest(self.points, free, of_free=False) <= floor
             if stuck.all():
                 break
@@ -220,7 +223,7 @@ class _Run:
                 found = found or self._above(free & self.mesh.near(low, rings), floor)
             reached = quality if found is None or found is kept else self._quality(found)
             costly = _costs_too_much(quality, reached, floor)
-            self.refused |= costly
+            refused |= costly
             if found is None or (costly and not patient):
                 step /= 2
                 floor -= step
@@ -234,13 +237,12 @@ class _Run:
                     yield RAISING, found.points
             floor += step
         self.now = kept
+        return refused
 
     def _quality(self, seen: _Seen) -> Array:
         """Return the smallest scaled Jacobian (m,) of each element at its nodes, and as a straight one."""
-        both = (
-            self.mesh.judge(points, self.limits.threads) for points in (seen.points, self.mesh.straight(seen.points))
-        )
-        return np.minimum(*(found.scaled_jacobians for found in both))
+        straight = self.mesh.judge(self.mesh.straight(seen.points), self.limits.threads)
+        return np.minimum(seen.jacobians, straight.scaled_jacobians)
 
     def _smallest(self, points: Array, free: Mask, of_free: bool) -> Array:
         return self.mesh.kernel.smallest(points, self.sizes, free.astype(np.uint8), of_free, self.limits.threads)

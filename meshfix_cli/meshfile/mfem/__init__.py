@@ -170,7 +170,7 @@ def _read_nodes(mesh: _Mesh, text: bytes, at: int) -> int:
     if mesh.order > HIGHEST:
         raise ReadError(f"has nodes of order {mesh.order}, which are not read")
     mesh.apart, mesh.lobatto = kind.re is _APART, kind["even"] is None and mesh.order > 2
-    n, d = (_own(mesh) if mesh.apart else mesh.n), int(space[2])
+    n, d = (int(_own(mesh).sum()) if mesh.apart else mesh.n), int(space[2])
     if mesh.order > 1 and not mesh.apart:
         if not len(_sizes(mesh)[1]):
             raise ReadError("has no elements")
@@ -182,13 +182,14 @@ def _read_nodes(mesh: _Mesh, text: bytes, at: int) -> int:
     return at
 
 
-def _own(mesh: _Mesh) -> int:
-    """Return how many nodes elements have that have each its own."""
-    types = _sizes(mesh)[1]
+def _own(mesh: _Mesh) -> Int64:
+    """Return how many nodes elements (m,) have that have each its own."""
+    types, count = _sizes(mesh)[1], np.zeros(len(_TYPES), dtype=np.int64)
     for kind in np.unique(types).tolist():
         if kind in (_VERTEX, _PYRAMID):
             raise ReadError(f"has nodes of its own for each {_TYPES[kind][0]}, which are not read")
-    return sum(len(own_nodes(_TYPES[kind][0], mesh.order)) for kind in types.tolist())
+        count[kind] = len(own_nodes(_TYPES[kind][0], mesh.order))
+    return count[types]
 
 
 def _read_sets(text: bytes, at: int, count: int) -> tuple[dict[str, Int64], int]:
@@ -258,8 +259,7 @@ def _put(runs: Runs, cells: Cells, corners: Callable[[], Places], mesh: _Mesh, s
 
 def _add_apart(runs: Runs, mesh: _Mesh) -> NDArray[np.bool_]:
     """Add the elements, which have points of their own; return which of these (n,) are on the boundary."""
-    table, (_, types) = mesh.tables["elements"], _sizes(mesh)
-    sizes = np.array([len(own_nodes(_TYPES[kind][0], mesh.order)) for kind in types.tolist()], dtype=np.int64)
+    table, (_, types), sizes = mesh.tables["elements"], _sizes(mesh), _own(mesh)
     first = np.cumsum(sizes) - sizes
     outside = _on_boundary(mesh)
     held = np.zeros(int(sizes.sum()), dtype=bool)

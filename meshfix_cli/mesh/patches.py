@@ -135,7 +135,8 @@ def _in_planes(surface: _Surface, around: Around, patch: Numbers, creases: Numbe
 def _along_edges(surface: _Surface, around: Around, patch: Numbers, creases: Numbers, facets: Places) -> Slides:
     points, tolerance = surface.points, surface.tolerance
     vertices, pairs, ways = around.passed(points, creases, facets)
-    good = _sine(ways[:, 0], ways[:, 1]) <= tolerance
+    both = np.arange(2 * len(ways), dtype=np.int32).reshape(-1, 2)
+    good = kernels.sines_between(ways.reshape(-1, ways.shape[2]), both) <= tolerance
     good &= ((ways[:, 0] * ways[:, 1]).sum(axis=1) < 0) | surface.given.broken[vertices]
     vertices, pairs = vertices[good], pairs[good]
     good = _flat_sides(surface, around, patch, vertices)
@@ -229,16 +230,6 @@ def unit_vectors(vectors: Array) -> Array:
     """Return vectors (..., d) of the length 1; those without a length stay."""
     rows = np.ascontiguousarray(vectors).reshape(-1, vectors.shape[-1])
     return kernels.unit_vectors(rows).reshape(vectors.shape)
-
-
-def _sine(one: Array, other: Array) -> Array:
-    """Return the sines (p,) of the angles between vectors (p, d) taken as lines; 0 where one has no length."""
-    product = np.linalg.norm(one, axis=1) * np.linalg.norm(other, axis=1)
-    if one.shape[1] == 2:
-        across = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0])
-    else:
-        across = np.linalg.norm(np.cross(one, other), axis=1)
-    return np.divide(across, product, out=np.zeros(len(one)), where=product > 0)
 
 
 class Joints:

@@ -7,7 +7,7 @@ import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,10 @@ from meshfix_cli.cli.options import (
     REPORTS,
     Show,
     allowing,
+    check_morph,
     chosen,
     holding,
+    morphing,
     packed,
     requiring,
     showing,
@@ -31,7 +33,8 @@ from meshfix_cli.cli.options import (
 from meshfix_cli.cli.process import SOME_FAILED, VALID, abort_all, complain, cores, courses, find_processes, helpers
 from meshfix_cli.errors import WriteError
 from meshfix_cli.mesh.elements import counted
-from meshfix_cli.repair import Files, Held, Judge, Method
+from meshfix_cli.repair import Files, Held, Method, Morph
+from meshfix_cli.repair.judge import Judge
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -84,8 +87,8 @@ class _Listed:
 
             write_text(self.page, page_of_many(files, total, tally, chosen()))
 
-    def pairs(self, *, absolute: bool) -> list[tuple[str, str]]:
-        """Inputs and outputs, checked before any work."""
+    def pairs(self, reference: str | None = None, *, absolute: bool) -> list[tuple[str, str]]:
+        """Inputs and outputs, checked before any work: none replaces one that is read."""
         from meshfix_cli.workers.batch import distinct, expanded, named_in, outputs
 
         if self.files_from is not None:
@@ -94,7 +97,7 @@ class _Listed:
             names = [*expanded(self.sources), *(named_in(self.files_from) if self.files_from is not None else ())]
             sources = distinct(os.path.abspath(name) if absolute else name for name in names)  # noqa: PTH100
             folder = os.path.abspath(self.output_dir) if absolute else self.output_dir  # noqa: PTH100
-            pairs = list(zip(sources, outputs(sources, folder, self.reports), strict=True))
+            pairs = list(zip(sources, outputs(sources, folder, self.reports, given(reference)), strict=True))
         except ValueError as error:
             raise click.UsageError(str(error)) from error
         if not pairs:
@@ -205,6 +208,10 @@ _running = packed(
 EXAMPLES = (
     ("All meshes of a folder", "meshfix batch 'meshes/*.vtk' --output-dir repaired"),
     ("Go on with a batch that was killed", "meshfix batch --resume 'meshes/**/*.vtk' --output-dir repaired"),
+    (
+        "Each with the shapes of before a morph",
+        "meshfix batch --reference mesh.vtk 'meshes/*.vtk' --output-dir repaired",
+    ),
     ("The first of eight parts of the work", "meshfix batch --shard 1/8 'meshes/*.vtk' --output-dir repaired"),
 )
 
@@ -215,6 +222,7 @@ EXAMPLES = (
 @under(IN_OUT, "--resume", is_flag=True, help="Skip a file whose output is not older, and valid.")
 @storing
 @solving
+@morphing
 @allowing
 @requiring
 @holding
@@ -225,6 +233,7 @@ def batch(
     resume: bool,
     files: Files,
     method: Method,
+    morph: Morph,
     allow_inverted: bool,
     requirements: tuple[Requirement, ...],
     held: Held,
@@ -238,13 +247,18 @@ def batch(
     from meshfix_cli.report.tally import Tally, kept
     from meshfix_cli.workers.batch import Task, run
 
+    check_morph(morph, method)
     helpers.add("workers")
     with where.workers() as (executor, in_flight):
         if executor is None:
             return
-        pairs = listed.pairs(absolute=where.executor == "dask")
+        far = where.executor == "dask"
+        if morph.reference is not None:
+            held.read_reference(morph.reference, show.threads)  # what is wrong with it is told once, before any work
+            morph = replace(morph, reference=os.path.abspath(morph.reference)) if far else morph  # noqa: PTH100
+        pairs = listed.pairs(morph.reference, absolute=far)
         judge = Judge(show.metrics, requirements, brief=show.quiet and not listed.reports)
-        task = Task(files, held, method, judge, resume)
+        task = Task(files, held, morph, method, judge, resume)
         passed, done, tally = True, {}, Tally()
         courses[:] = [_Counted(tally, len(pairs))]
         try:

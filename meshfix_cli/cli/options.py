@@ -16,9 +16,17 @@ from meshfix_cli.cli.help import FREEDOM, IN_OUT, METHOD, PROCESS, QUALITY, REPO
 from meshfix_cli.cli.names import CELLS, FILE, JSON, PAGE, PLOT
 from meshfix_cli.cli.process import cores
 from meshfix_cli.quality.metrics import NUMBERS
-from meshfix_cli.repair import CURVINGS, MAX_DEVIATION, SLIDES, Files, Held, Judge, Method
+from meshfix_cli.repair import CURVINGS, MAX_DEVIATION, SLIDES, Files, Held, Method, Morph
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.strategies import FEATURE_ANGLE, RANGES, SMOOTH, STRATEGIES, THRESHOLD
+from meshfix_cli.solve.strategies import (
+    FEATURE_ANGLE,
+    RANGES,
+    SMOOTH,
+    STRATEGIES,
+    THRESHOLD,
+    senseless_beside_reference,
+)
 
 if TYPE_CHECKING:
     from meshfix_cli.quality.requirement import Requirement
@@ -385,6 +393,38 @@ solving = packed(
     ),
 )
 sliding = packed("method", Method, *_SLIDE)
+morphing = packed(
+    "morph",
+    Morph,
+    under(
+        METHOD,
+        "--reference",
+        type=FILE,
+        metavar="FILE",
+        help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in "
+        "it. Of a surface: that on which its vertices move.",
+    ),
+    under(
+        METHOD,
+        "--displace",
+        metavar="NAME",
+        help="Move each point first by its vector in this point-data array, as a morph or a time step gives it; the "
+        "mesh as it was is the reference then, unless there is another. With --slide the boundary keeps the shape that "
+        "it has got.",
+    ),
+)
+
+
+def check_morph(morph: Morph, method: Method) -> None:
+    """Refuse what makes no sense with a reference, which these options give."""
+    if morph.reference == "-":
+        raise click.UsageError("--reference is a file: stdin is INPUT's")
+    senseless = senseless_beside_reference(method.only_invalid, method.threshold)
+    for option in given(morph.reference and "--reference", morph.displace and "--displace"):
+        for other in senseless:
+            raise click.UsageError(f"{option} and --{other.replace('_', '-')} exclude each other")
+
+
 REPORTS = (
     under(REPORT, "--report", "page", type=PAGE, metavar="FILE.html", help="Write the report as a page."),
     under(REPORT, "--report-json", "json", type=JSON, metavar="FILE.json", help="Write the report as JSON."),

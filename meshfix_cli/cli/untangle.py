@@ -12,31 +12,27 @@ import click
 from click.core import ParameterSource
 
 from meshfix_cli.cli.course import READING, SOLVING, Course
-from meshfix_cli.cli.files import given, is_streamed, open_files, report_stream, show_stage, write_cells
-from meshfix_cli.cli.help import METHOD, PROCESS, REPORT, Command, under
-from meshfix_cli.cli.names import FILE, HISTORY
+from meshfix_cli.cli.files import is_streamed, open_files, report_stream, show_stage, write_cells
+from meshfix_cli.cli.help import PROCESS, REPORT, Command, under
+from meshfix_cli.cli.names import HISTORY
 from meshfix_cli.cli.options import (
     Draw,
     Show,
     allowing,
+    check_morph,
     drawing,
     drawing_cells,
     holding,
+    morphing,
     reporting,
     requiring,
     solving,
     writing,
 )
 from meshfix_cli.cli.process import INVERTED, VALID, courses, processes
-from meshfix_cli.errors import naming
-from meshfix_cli.repair import Files, Held, Method, repair
-from meshfix_cli.solve.strategies import senseless_beside_reference
+from meshfix_cli.repair import Files, Held, Method, Morph, repair
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from meshfix_cli.meshfile.document import Document
     from meshfix_cli.quality.requirement import Requirement
     from meshfix_cli.repair import Steps
 
@@ -54,21 +50,7 @@ EXAMPLES = (
 @click.command(cls=Command, examples=EXAMPLES, short_help="Move interior vertices until no element is inverted.")
 @writing
 @solving
-@under(
-    METHOD,
-    "--reference",
-    type=FILE,
-    metavar="FILE",
-    help="The mesh before its boundary moved, with the same elements: they get the shapes back that they have in it. "
-    "Of a surface: that on which its vertices move.",
-)
-@under(
-    METHOD,
-    "--displace",
-    metavar="NAME",
-    help="Move each point first by its vector in this point-data array, as a morph or a time step gives it; INPUT as "
-    "it was is the reference then, unless there is another. With --slide the boundary keeps the shape that it has got.",
-)
+@morphing
 @under(REPORT, "--history", type=HISTORY, metavar="FILE.csv", help="Write a CSV line for each sweep.")
 @drawing_cells
 @drawing
@@ -95,8 +77,7 @@ def untangle(
     held: Held,
     show: Show,
     method: Method,
-    reference: str | None,
-    displace: str | None,
+    morph: Morph,
     history: str | None,
     cells: str | None,
     draw: Draw,
@@ -118,8 +99,7 @@ def untangle(
     from meshfix_cli.report.as_json import history_csv
 
     show.check(verbose)
-    for option in given(reference and "--reference", displace and "--displace"):
-        _check_reference(option, reference, method)
+    check_morph(morph, method)
     if mpi and click.get_current_context().get_parameter_source("threads") is ParameterSource.DEFAULT:
         show = replace(show, threads=1)  # the launcher has a process for each core
         click.get_current_context().params["threads"] = 1
@@ -145,7 +125,7 @@ def untangle(
             document, output = open_files(files, held, show.threads, history, cells, *draw.names)
             if cells is not None:
                 check_cells(document, cells)
-            document, before = _displaced(document, displace, reference, held, show.threads)
+            document, before = morph.of(document, held, show.threads)
             alone = partial(method.solve, threads=show.threads, watch=watch)
             solve, put = (root.solve, root.put) if root else (alone, None)
             course.begin(SOLVING, document.mesh.topology.m)
@@ -158,28 +138,3 @@ def untangle(
             draw.write(report, show.threads)
         show.print(report, report_stream(files), verbose)
         sys.exit(VALID if (report.valid or allow_inverted) and report.met else INVERTED)
-
-
-def _displaced(
-    first: Document, displace: str | None, reference: str | None, held: Held, threads: int
-) -> tuple[Document, NDArray[np.float64] | None]:
-    """Return the document, displaced if it is to be, and where its vertices were before the boundary moved."""
-    document = first
-    if displace is not None:
-        from meshfix_cli.meshfile.displaced import displaced, places_in
-
-        document = displaced(first, displace)
-    if reference is not None:
-        return document, held.read_reference(reference, document, threads)
-    if displace is None:
-        return document, None
-    with naming(first.name):
-        return document, places_in(first, document, threads)
-
-
-def _check_reference(option: str, reference: str | None, method: Method) -> None:
-    """Refuse what makes no sense with a reference, which an option gives."""
-    if reference == "-":
-        raise click.UsageError("--reference is a file: stdin is INPUT's")
-    for other in senseless_beside_reference(method.only_invalid, method.threshold):
-        raise click.UsageError(f"{option} and --{other.replace('_', '-')} exclude each other")

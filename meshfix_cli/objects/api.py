@@ -38,7 +38,8 @@ from meshfix_cli.objects.options import (
     threads_of,
 )
 from meshfix_cli.quality.summary import Summary, summarise
-from meshfix_cli.repair import Files, Held, Judge, Method, Sliding, as_surface, repair
+from meshfix_cli.repair import Files, Held, Method, Sliding, as_surface, repair
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.report.sliding import sliding
 from meshfix_cli.solve.perturb import perturb as perturb_mesh
 from meshfix_cli.solve.perturb import tangled

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from meshfix_cli.errors import OptionError
 from meshfix_cli.quality.metrics import METRICS
 from meshfix_cli.quality.requirement import Requirement
-from meshfix_cli.repair import CURVINGS, SLIDES, Curving, Held, Judge, Method, Sliding
+from meshfix_cli.repair import CURVINGS, SLIDES, Curving, Held, Method, Sliding
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.solve.perturb import Distance
 from meshfix_cli.solve.strategies import RANGES, STRATEGIES, Smooth, senseless_beside_reference
 

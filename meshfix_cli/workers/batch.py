@@ -27,7 +27,8 @@ from typing import Any
 
 from meshfix_cli.errors import MeshfixError, ReadError, on_one_line
 from meshfix_cli.meshfile.reading import pieces_of
-from meshfix_cli.repair import Files, Held, Judge, Method, repair
+from meshfix_cli.repair import Files, Held, Method, Morph, repair
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.report.as_json import SCHEMA, to_json
 from meshfix_cli.report.facts import Report
 
@@ -77,7 +78,7 @@ def distinct(names: Iterable[str]) -> list[str]:
     return list(first.values())
 
 
-def outputs(sources: Sequence[str], folder: str, reports: Sequence[str] = ()) -> list[str]:
+def outputs(sources: Sequence[str], folder: str, reports: Sequence[str] = (), read: Sequence[str] = ()) -> list[str]:
     """Return the name of each output, which is that of the input in another folder.
 
     Parameters
@@ -86,6 +87,8 @@ def outputs(sources: Sequence[str], folder: str, reports: Sequence[str] = ()) ->
     folder : str
     reports : sequence of str
         More files to be written.
+    read : sequence of str
+        More files that are read.
 
     Raises
     ------
@@ -94,7 +97,7 @@ def outputs(sources: Sequence[str], folder: str, reports: Sequence[str] = ()) ->
     """
     targets = [os.path.join(folder, os.path.basename(source)) for source in sources]  # noqa: PTH118, PTH119
     pieces = [(source, *pieces_of(source, target)) for source, target in zip(sources, targets, strict=True)]
-    inputs = {os.path.realpath(source): source for source in sources}  # links to one file are repaired each
+    inputs = {os.path.realpath(source): source for source in (*read, *sources)}  # links to one file are repaired each
     for source, paths, _ in pieces:
         for path in paths:
             other = inputs.setdefault(os.path.realpath(path), source)
@@ -124,14 +127,16 @@ class Task:
     ----------
     files : Files
     held : Held
+    morph : Morph
     method : Method
     judge : Judge
     resume : bool
-        Skip the file where a valid output is not older than it.
+        Skip the file where a valid output is not older than it, or than the reference.
     """
 
     files: Files
     held: Held
+    morph: Morph
     method: Method
     judge: Judge
     resume: bool = False
@@ -141,7 +146,8 @@ class Task:
         """What all files share, ready for JSON."""
         storing = {name: getattr(self.files, name) for name in ("double", "fix_orientation", "backup")}
         asked = {"metrics": self.judge.metrics, "requirements": [str(one) for one in self.judge.requirements]}
-        return {**asdict(self.method), **asdict(self.held), **storing, **asked, "resume": self.resume}
+        morph, more = asdict(self.morph), {"resume": self.resume}
+        return {**asdict(self.method), **asdict(self.held), **morph, **storing, **asked, **more}
 
     def at(self, source: str, target: str) -> Task:
         """Return the same for other files."""
@@ -167,7 +173,8 @@ def work(task: Task) -> Result:
         report, status = _made_before(task) if task.resume else None, "skipped"
         if report is None:
             document, output = task.files.open(task.held, task.judge.threads)
-            report = repair(document, output, task.files, task.method, task.judge)
+            document, before = task.morph.of(document, task.held, task.judge.threads)
+            report = repair(document, output, task.files, task.method, task.judge, reference=before)
             status = "valid" if report.valid and report.met else "invalid"
         return task.result(status, time.perf_counter() - start, facts=to_json(report))
     except (MeshfixError, OSError, MemoryError) as error:
@@ -181,6 +188,8 @@ def _made_before(task: Task) -> Report | None:
     """Return the report on the output, if that is not older than the input, valid, and all that is asked for."""
     source, target = Path(task.files.source), Path(task.files.target)
     paths = [source, *map(Path, pieces_of(str(source), str(target))[0])]
+    if task.morph.reference is not None:
+        paths.append(Path(task.morph.reference))
     if not target.is_file() or target.stat().st_mtime_ns < max(path.stat().st_mtime_ns for path in paths):
         return None
     try:

@@ -16,7 +16,8 @@ from plain_files import WRITERS, writers
 from zones import ZONES
 
 from meshfix_cli.errors import InvalidMeshError, ReadError
-from meshfix_cli.repair import Held, Judge
+from meshfix_cli.repair import Held
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.report.facts import Report
 
 EXAMPLES = int(os.environ.get("MESHFIX_FUZZ", "200"))

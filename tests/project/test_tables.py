@@ -101,5 +101,5 @@ def test_rooms() -> None:
     """The page for newcomers names the rooms that there are."""
     rooms = re.findall(r"^\| `([\w.]+)/?` \|", (DOCS / "extending.md").read_text(), re.MULTILINE)
     rooms = [room for room in rooms if room not in Move.__members__]
-    there = {path.name for path in PACKAGE.iterdir() if path.is_dir()} - {"__pycache__"} | {"repair.py"}
+    there = {path.name for path in PACKAGE.iterdir() if path.is_dir()} - {"__pycache__"}
     assert set(rooms) == there

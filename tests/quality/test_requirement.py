@@ -12,7 +12,7 @@ from meshfix_cli.quality.formulas import evaluate, evaluate_at, worst_and_mean
 from meshfix_cli.quality.metrics import ANGLES, METRICS, NUMBERS, having
 from meshfix_cli.quality.requirement import Requirement
 from meshfix_cli.quality.summary import summarise
-from meshfix_cli.repair import Judge
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.report.as_json import to_json
 from meshfix_cli.report.facts import quality_rows, required
 

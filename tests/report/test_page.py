@@ -29,7 +29,7 @@ from reports import FIRST, built, report_on, tangled
 from meshfix_cli import read
 from meshfix_cli.mesh.elements import ELEMENTS
 from meshfix_cli.quality.formulas import evaluate
-from meshfix_cli.repair import Judge
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.report import figures
 from meshfix_cli.report.facts import Report
 from meshfix_cli.report.figures import figures as figures_of

@@ -12,7 +12,7 @@ from places import SAMPLES
 from meshfix_cli import read
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.meshfile.document import Document
-from meshfix_cli.repair import Judge
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.report.facts import Report
 
 FIRST = 1000  # the file's number of the first element

@@ -15,12 +15,16 @@ from html import unescape
 from pathlib import Path
 from typing import Any
 
+import meshio
+import numpy as np
 import pytest
-from commands import MESHFIX, TANGLED, error_line, fill, on_terminal, results, run, statuses
+from commands import MESHFIX, TANGLED, VALID, error_line, fill, on_terminal, results, run, statuses
+from places import SAMPLES
 
 from meshfix_cli import __version__, read
 from meshfix_cli.quality.requirement import Requirement
-from meshfix_cli.repair import Files, Held, Judge, Method
+from meshfix_cli.repair import Files, Held, Method, Morph
+from meshfix_cli.repair.judge import Judge
 from meshfix_cli.workers import batch
 
 POSIX = pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="needs signals and /proc")
@@ -76,7 +80,7 @@ class Here(Executor):
 
 
 def tasks(count: int) -> list[batch.Task]:
-    return [batch.Task(Files(f"{i}.vtk", f"out/{i}.vtk"), Held(), Method(), Judge()) for i in range(count)]
+    return [batch.Task(Files(f"{i}.vtk", f"out/{i}.vtk"), Held(), Morph(), Method(), Judge()) for i in range(count)]
 
 
 def name(task: batch.Task) -> batch.Result:
@@ -434,7 +438,7 @@ def test_resume_does_again_what_is_old_broken_or_not_good_enough(inputs: Path, o
 
     def again(*requirements: str) -> list[str]:
         judge = Judge(requirements=tuple(map(Requirement.parse, requirements)))
-        task = batch.Task(Files(), Held(), Method(), judge, resume=True)
+        task = batch.Task(Files(), Held(), Morph(), Method(), judge, resume=True)
         return [batch.work(task.at(str(path), str(out / path.name)))["status"] for path in paths]
 
     assert again() == ["valid"] * 4
@@ -459,3 +463,38 @@ def test_options_reach_the_work(inputs: Path, out: Path) -> None:
     assert told["displacement"]["largest"] <= 0.35
     assert {one["phase"] for one in told["sweeps"]} == {"input", "Laplacian", "back to the input"}
     assert (out / "a.vtk.bak").read_text() == "precious"
+
+
+def test_many_meshes_get_back_the_shapes_of_one(inputs: Path, out: Path, tmp_path: Path) -> None:
+    fill(inputs, "a.vtk", "b.vtk")
+    command = ["batch", "--resume", "--json", "--jobs", 1, f"{inputs}/*.vtk", "--output-dir", out, "--reference"]
+    reference = tmp_path / "reference.vtk"
+    said = error_line(*command, reference, code=1)
+    assert said == f"meshfix: error: {reference}: No such file or directory"
+    told = results(run(*command, SAMPLES / "bracket.vtk", code=4))
+    assert all("bracket.vtk: as a reference: " in one["error"] for one in told.values())
+    shutil.copy(VALID, reference)
+    assert {one["status"] for one in results(run(*command, reference)).values()} == {"valid"}
+    run("untangle", "-q", "--reference", reference, inputs / "a.vtk", tmp_path / "alone.vtk")
+    assert (out / "a.vtk").read_bytes() == (out / "b.vtk").read_bytes() == (tmp_path / "alone.vtk").read_bytes()
+    assert {one["status"] for one in results(run(*command, reference)).values()} == {"skipped"}
+    later = (out / "a.vtk").stat().st_mtime_ns + 1_000_000_000
+    os.utime(reference, ns=(later, later))
+    assert {one["status"] for one in results(run(*command, reference)).values()} == {"valid"}
+    shutil.copy(VALID, out / "b.vtk")
+    assert "b.vtk would replace the input " in error_line(*command, out / "b.vtk", code=2)
+    said = error_line(*command, reference, "--only-invalid", code=2)
+    assert said == "Error: --reference and --only-invalid exclude each other"
+
+
+def test_each_mesh_moves_by_its_own_vectors(inputs: Path, out: Path, tmp_path: Path) -> None:
+    mesh = meshio.read(VALID)
+    for i in range(2):
+        mesh.point_data["motion"] = np.column_stack([0.1 * (i + 1) * mesh.points[:, :2], np.zeros(len(mesh.points))])
+        meshio.write(inputs / f"{i}.vtk", mesh, file_format="vtk42")
+    run("batch", "-q", "--displace", "motion", f"{inputs}/*.vtk", "--output-dir", out)
+    for i in range(2):
+        run("untangle", "-q", "--displace", "motion", inputs / f"{i}.vtk", tmp_path / "alone.vtk")
+        assert (out / f"{i}.vtk").read_bytes() == (tmp_path / "alone.vtk").read_bytes()
+        width = np.ptp(meshio.read(out / f"{i}.vtk").points[:, 0])
+        assert width == pytest.approx((1.1 + 0.1 * i) * np.ptp(mesh.points[:, 0]))

@@ -232,6 +232,17 @@ def test_what_ends_too_early_is_named(tmp_path: Path) -> None:
         assert document.mesh.topology.m < whole
 
 
+def test_a_section_that_does_not_end_may_have_been_cut(tmp_path: Path) -> None:
+    path = tmp_path / "in.bdf"
+    for before, after, told in (
+        (b"", b"", False),
+        (b"BEGIN BULK\n", b"ENDDATA\n", False),
+        (b"BEGIN BULK\n", b"", True),
+    ):
+        path.write_bytes(before + SQUARE + after)
+        assert any("no ENDDATA" in note for note in read(path).notes) is told
+
+
 def test_elements_in_fields_of_different_widths_are_not_renumbered() -> None:
     source = parse(SQUARE.replace(b"CTRIA3,12,7,2,3,5", b"CTRIA3  12      7       2       3       5"))
     assert types(source) == types(parse(SQUARE))

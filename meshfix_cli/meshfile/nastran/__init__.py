@@ -23,6 +23,7 @@ from meshfix_cli.meshfile.tables import Int64, Numbering, Runs
 
 _CURVED = {"CORD1C": "cylindrical", "CORD2C": "cylindrical", "CORD1S": "spherical", "CORD2S": "spherical"}
 _STRAIGHT = ("CORD1R", "CORD2R", "CORD3R")
+_CUT = "the bulk data have no ENDDATA: if the file was cut short, elements are missing"
 _TOLD = ("GRID", "ENDDATA", "SPC", "SPC1", *NAMES)
 
 
@@ -43,7 +44,7 @@ def parse(data: bytes) -> Source:
     return Source(
         coordinates.read(data), runs.cells, InPlace(data, coordinates, runs.corners), lambda: arrays,
         (REF,) * (REF in arrays.cell), held, _untold(deck),
-        numbers=lambda: numbering.numbers,
+        numbers=lambda: numbering.numbers, notes=(_CUT,) * deck.cut,
     )  # fmt: skip
 
 

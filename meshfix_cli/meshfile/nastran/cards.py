@@ -104,6 +104,8 @@ class Deck:
     labels : (n, 2) int32
     nodes : (n, 4) int32
         Integers in the first fields of their first lines.
+    cut : bool
+        A section of bulk data begins and does not end.
     """
 
     text: bytes
@@ -113,6 +115,7 @@ class Deck:
     filled: Int64
     labels: NDArray[np.int32]
     nodes: NDArray[np.int32]
+    cut: bool = False
 
     @classmethod
     def of(cls, data: bytes) -> Deck:
@@ -129,15 +132,17 @@ class Deck:
             raise ReadError("holds several bulk data sections, and one mesh is read: give each a file of its own")
         first = int(begins[0]) + 1 if len(begins) else 0
         ends = self.where("ENDDATA")
-        last = int(ends[ends >= first][0]) if (ends >= first).any() else len(self.begin)
+        ended = bool((ends >= first).any())
+        last = int(ends[ends >= first][0]) if ended else len(self.begin)
         kinds = self.kinds[first:last]
         there = np.bincount(kinds, minlength=len(self.names))
         names = [name if count else "" for name, count in zip(self.names, there.tolist(), strict=False)]
         here = slice(first, last)
-        deck = Deck(self.text, names, kinds, self.begin[here], self.filled[here], self.labels[here], self.nodes[here])
+        rows = self.begin[here], self.filled[here], self.labels[here], self.nodes[here]
+        deck = Deck(self.text, names, kinds, *rows, cut=first > 0 and not ended)
         for name, what in (("INCLUDE", "includes other files"), ("=", "repeats cards by =")):
-            if len(rows := deck.where(name)):
-                raise in_line(self.text, int(deck.begin[rows[0]]), f"{what}, which meshfix does not read")
+            if len(found := deck.where(name)):
+                raise in_line(self.text, int(deck.begin[found[0]]), f"{what}, which meshfix does not read")
         return deck
 
     def where(self, *names: str) -> Int64:

@@ -102,11 +102,13 @@ def lattice(family: str, order: int, by: str = "gmsh", complete: bool = True) ->
     family : str
         "line", "triangle", "quad", "tetra", "pyramid", "wedge" or "hexahedron".
     order : int
-    by : {"gmsh", "vtk", "vtk 8"}
-        Whose order of nodes.
+    by : {"gmsh", "vtk", "vtk 8", "rows"}
+        Whose order of nodes; or their coordinates run one after the other, the first fastest.
     complete : bool
         There are nodes also elsewhere than on edges.
     """
+    if by == "rows":
+        return tuple(sorted(lattice(family, order, complete=complete), key=lambda place: place[::-1]))
     corners = tuple(tuple(order * x for x in corner) for corner in _FAMILIES[family].corners)
     return tuple(_nodes(family, corners, order, by, complete))
 

@@ -2,8 +2,9 @@
 
 A line of NPOIN has the coordinates and, often, the number of the point, one of the others the number of VTK for the
 type, the vertices and, often, the number of the element. Several zones, each with all of these, are parts of one mesh.
+Elements of order p have that number and 100 (p - 1), and nodes whose coordinates run one after the other.
 
-Source: SU2 documentation, "Mesh File"; SU2, "CSU2ASCIIMeshReaderBase.cpp".
+Source: SU2 documentation, "Mesh File"; SU2, "CSU2ASCIIMeshReaderBase.cpp" and, of higher order, "CPrimalGridFEM.cpp".
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from functools import partial
 import numpy as np
 
 from meshfix_cli.errors import ReadError
+from meshfix_cli.mesh.lagrange import Kind, kinds
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import (
@@ -37,6 +39,8 @@ _COMMENT = re.compile(rb"%[^\n\r]*")
 _KEYWORD = re.compile(rb"([A-Za-z_]\w*)[ \t]*=[ \t]*([^\n\r]*)")
 _SENDING = re.compile(rb"\s*SEND_RECV[ \t]*=[^\n\r]*")  # between the number of a marker's elements and these
 _ZONE = "su2:zone"
+_Order = list[int] | slice  # which node of the file stands in each place of VTK's
+_Type = tuple[str, int, _Order]  # its name and number of nodes
 
 
 @dataclass
@@ -65,11 +69,12 @@ def parse(data: bytes) -> Source:
     for number, (zone, here) in enumerate(zip(zones, spans, strict=True), start=1):
         labels = {_ZONE: number} if len(zones) > 1 else {}
         for name, table in zone.markers:
-            for kind, rows in _by_type(table):
+            for (kind, size, order), rows in _by_type(table):
                 ids = None if name else rows + element
-                vertices = Numbering(np.arange(len(here))).points_of(table.integers(1, 1 + kind[1], rows), ids)
-                corners = partial(_corners, table, kind[1], rows)
-                runs.add(Cells(kind[0], vertices + point, ids), corners, labels, (name,) if name else ())
+                nodes = table.integers(1, 1 + size, rows)[:, order]
+                vertices = Numbering(np.arange(len(here))).points_of(nodes, ids)
+                corners = partial(_corners, table, size, order, rows)
+                runs.add(Cells(kind, vertices + point, ids), corners, labels, (name,) if name else ())
             element += 0 if name else len(table.counts)
         point += len(here)
     coordinates = Places.of_text(np.concatenate(spans))
@@ -117,16 +122,28 @@ def _count(text: bytes, match: re.Match[bytes]) -> int:
     return int(words[0][:18])
 
 
-def _by_type(table: IntegerLines) -> Iterator[tuple[tuple[str, int], Int64]]:
-    """Give the types of elements, their name and size, and their rows."""
+def _by_type(table: IntegerLines) -> Iterator[tuple[_Type, Int64]]:
+    """Give the types of elements and their rows."""
     types = table.integers(0, 1)[:, 0]
     for rows in alike(types):
-        kind = TYPES.get(int(types[rows[0]]), ("", 0))
-        if not kind[1]:
+        kind = _type_of(int(types[rows[0]]))
+        if kind is None:
             at = table.place(int(rows[0]))
             raise in_line(table.text, at, f"elements of the type {types[rows[0]]} are not known")
         yield kind, rows
 
 
-def _corners(table: IntegerLines, size: int, rows: Int64) -> Places:
-    return Places.of_text(table.columns(1, 1 + size, rows), "i8")
+def _type_of(number: int) -> _Type | None:
+    """Return a type by its number."""
+    raised, linear = divmod(number, 100)
+    name, size = TYPES.get(linear, ("", 0))
+    if not raised:
+        return (name, size, slice(None)) if size else None
+    kind = Kind(name, raised + 1, True)
+    key = next((key for key, one in kinds().items() if one == kind), None)
+    order = [] if key is None else kind.order_of("rows")
+    return (key, len(order), order) if key else None
+
+
+def _corners(table: IntegerLines, size: int, order: _Order, rows: Int64) -> Places:
+    return Places.of_text(table.columns(1, 1 + size, rows)[:, order], "i8")

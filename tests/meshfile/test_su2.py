@@ -12,6 +12,7 @@ from shapes import block, plate
 
 from meshfix_cli import read
 from meshfix_cli.errors import MeshfixError, ReadError
+from meshfix_cli.mesh.lagrange import lattice
 from meshfix_cli.meshfile.su2 import parse
 
 SMALL = b"""NDIME= 2
@@ -71,6 +72,37 @@ def test_zones_that_lie_over_one_another_are_no_fault() -> None:
     assert source.cells[4].vertices.tolist() == [[5, 6, 9]]
 
 
+def bent(x: np.ndarray) -> np.ndarray:
+    """Where a place in the unit cube goes: a polynomial of order 3 in the first coordinate alone."""
+    moved = x.copy()
+    moved[..., 1] += 0.2 * x[..., 0] ** 3
+    return moved
+
+
+@pytest.mark.parametrize(
+    ("number", "places"),
+    [
+        (205, [(x, y) for y in range(4) for x in range(4 - y)]),
+        (209, [(x, y) for y in range(4) for x in range(4)]),
+        (210, [(x, y, z) for z in range(4) for y in range(4 - z) for x in range(4 - y - z)]),
+        (212, [(x, y, z) for z in range(4) for y in range(4) for x in range(4)]),
+        (213, [(x, y, z) for z in range(4) for y in range(4) for x in range(4 - y)]),
+    ],
+)  # fmt: skip
+def test_nodes_of_higher_order_run_along_rows(number: int, places: list[tuple[int, ...]], tmp_path: Path) -> None:
+    points = bent(np.array(places) / 3)
+    lines = [f"NDIME= {points.shape[1]}", "NELEM= 1", " ".join(map(str, (number, *range(len(places)), 0)))]
+    lines += [f"NPOIN= {len(points)}", *(" ".join(map(repr, point)) for point in points.tolist())]
+    path = tmp_path / "one.su2"
+    path.write_text("\n".join(lines) + "\n")
+    document = read(path)
+    assert document.mesh.quadratic is not None  # it is curved
+    assert document.mesh.check()[0] == 0
+    (run,) = document.source.cells
+    expected = np.array(lattice(run.type.rstrip("0123456789"), 3, "vtk")) / 3
+    np.testing.assert_allclose(document.source.points[run.vertices[0]], bent(expected), atol=1e-15)
+
+
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
@@ -81,7 +113,8 @@ def test_zones_that_lie_over_one_another_are_no_fault() -> None:
         (b"MARKER_ELEMS= 2", b"MARKER_ELEMS= 1", "line 16: there are more lines than announced"),
         (b"NPOIN= 5", b"NPOIN=", "line 6: NPOIN has no number"),
         (b"NDIME= 2", b"NDIME= 4", "NDIME is 4"),
-        (b"5 0 1 4 0", b"209 0 1 4 0", "line 3: elements of the type 209 are not known"),
+        (b"5 0 1 4 0", b"199 0 1 4 0", "line 3: elements of the type 199 are not known"),
+        (b"5 0 1 4 0", b"1105 0 1 4 0", "line 3: elements of the type 1105 are not known"),
         (b"9 1 2 3 4", b"9 1 2 3", "line 4: there are not 5 numbers"),
         (b"9 1 2 3 4", b"9 1 2 3 7", "the cell 1 names the point 7"),
         (b"0.5 1 4", b"0.5 x 4", "line 11: 'x' is not a number"),

@@ -74,13 +74,8 @@ class _Numbered(NamedTuple):
 
 @cache
 def own_nodes(key: str, order: int) -> list[int]:
-    """Return where each node of an element, in VTK's order, stands among those that it has for itself.
-
-    Their coordinates run one after the other, the first fastest.
-    """
-    places = lattice(key, order, "vtk")
-    rank = {place: i for i, place in enumerate(sorted(places, key=_by_coordinates))}
-    return [rank[place] for place in places]
+    """Return where each node of an element, in VTK's order, stands among those that it has for itself."""
+    return Kind(key, order, True).order_of("rows")
 
 
 def higher_order(
@@ -151,10 +146,6 @@ def _whole(key: str) -> Rows:
     return (tuple(range(ELEMENTS[key].nodes)),)
 
 
-def _by_coordinates(place: Place) -> Place:
-    return place[::-1]
-
-
 @cache
 def _interior(key: str, order: int) -> list[tuple[int, Place]]:
     """Return the nodes inside, in MFEM's order: where they stand in VTK's, and places; a line has them on its edge."""
@@ -162,7 +153,7 @@ def _interior(key: str, order: int) -> list[tuple[int, Place]]:
         return []
     places = lattice(key, order, "vtk")
     some = [(column, places[column]) for column, here in enumerate(_between(key, order)) if len(here) == _corners(key)]
-    return sorted(some, key=lambda one: _by_coordinates(one[1]))
+    return sorted(some, key=lambda one: one[1][::-1])
 
 
 def _corners(key: str) -> int:

@@ -172,7 +172,10 @@ OWN = {
         "boundaries are at one place; no polygons or polyhedra",
         "families of zones and cells; boundary conditions, which are held, and sections", "`h5py`",
     ),
-    "su2": Own("su2", recognise.su2, {".su2": "su2"}, "SU2", "zones, markers, boxes of deformation, elements of order up to ten", "zones; markers"),
+    "su2": Own(
+        "su2", recognise.su2, {".su2": "su2"}, "SU2",
+        "zones, markers, boxes of deformation, elements of order up to ten", "zones; markers",
+    ),
     "off": Own(
         "off", recognise.off, {".off": "off"}, "Geomview",
         "all keywords and dialects in text; colours, normals and texture coordinates stay", "none",

@@ -35,9 +35,10 @@ MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
 SHRINK = 0.4  # of eps from one minimisation to the next
 POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far as the second
 POOR_JACOBIAN = 0.2  # scaled, at nodes
-STEP, LEAST_STEP = 0.1, 0.02  # of the floor
+STEP, LEAST_STEP, NEARLY = 0.1, 0.02, 0.999  # of the floor; the last is this share of the highest
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
+RAISING_GAIN = 0.5  # share of what is missing by which a minimisation comes nearer, or the floor is out of reach
 RELAXING_RINGS = (1,)
 RELAXED = 0.1  # share of the way to the middle by which held nodes give way at a time
 HALVINGS = 5  # that look for a smaller share
@@ -212,6 +213,7 @@ class _Run:
         """
         step, floor, kept, quality, refused = STEP, STEP, self.now, self._quality(self.now), False
         while floor < highest and step >= LEAST_STEP:
+            floor = min(floor, NEARLY * highest)
             straight = self.mesh.kernel.sizes(self.points, self.limits.threads)
             self.rest, self.sizes = self.points, np.maximum(straight, sizes)
             stuck = self._smallest(self.points, free, of_free=False) <= floor
@@ -219,8 +221,11 @@ class _Run:
                 break
             low = ~stuck & (self._smallest(self.points, free, of_free=True) <= floor)
             found = None if low.any() else self.now
+            region = np.zeros_like(free)
             for rings in RAISING_RINGS:
-                found = found or self._above(free & self.mesh.near(low, rings), floor)
+                smaller, region = region, free & self.mesh.near(low, rings)
+                if found is None and (region != smaller).any():
+                    found = self._above(region, floor)
             reached = quality if found is None or found is kept else self._quality(found)
             costly = _costs_too_much(quality, reached, floor)
             refused |= costly
@@ -249,13 +254,14 @@ class _Run:
 
     def _above(self, region: Mask, floor: float) -> _Seen | None:
         """Return points where all coefficients that depend on a region's nodes are above a floor, if they are found."""
-        if not region.any():
-            return None
-        energy, eps = self._energy(region), RAISING_EPS
+        energy, eps, largest = self._energy(region), RAISING_EPS, -math.inf
         for _ in range(RAISING_MINIMISATIONS):
-            if energy.minimise(eps, floor, RAISING_ITERATIONS)[2] > floor:
+            least = energy.minimise(eps, floor, RAISING_ITERATIONS)[2]
+            if least > floor:
                 return self._seen(energy.points(self.points.shape[1]))
-            eps *= RAISING_SHRINK
+            if least - largest < RAISING_GAIN * (floor - least):
+                return None
+            eps, largest = eps * RAISING_SHRINK, max(largest, least)
         return None
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import distinct
+from meshfix_cli.quality.pinched import pinched
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.quadratic import Quadratic
@@ -141,6 +142,8 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
     free = mesh.movable | quadratic.free
     proofs = quadratic.kernel.impossible(mesh.points, free.astype(np.uint8))
     straight = find_obstacles(replace(mesh, quadratic=None), threads)
+    asked = mesh.judge_curved(threads)[0][quadratic.rows] & (proofs == 0)
+    proofs[pinched(quadratic, mesh.points, free, asked)] = 1
     alone, together = quadratic.rows[proofs == 1], np.sort(quadratic.rows[proofs == 2]).astype(np.int32)
     alone = np.union1d(alone, np.setdiff1d(straight.inverted, quadratic.rows)).astype(np.int32)
     bent = np.zeros(mesh.topology.m, dtype=bool)

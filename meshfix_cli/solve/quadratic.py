@@ -22,6 +22,7 @@ import numpy as np
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
+from meshfix_cli.quality.obstacles import proofs_of_curved
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
 
@@ -355,6 +356,9 @@ def curved_steps(
     first = clock.record("input", mesh)
     yield mesh, first
     best, found = mesh, [mesh]
+    # The programme and the energy would try in vain, and not see what becomes of others.
+    hopeless = proofs_of_curved(mesh, quadratic, threads) == 1
+    others = None if hopeless.all() else quadratic.part(~hopeless) if hopeless.any() else quadratic
     if _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
@@ -364,12 +368,17 @@ def curved_steps(
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
     for start in [best] if best is mesh or best.check(threads)[0] < first.inverted else [best, mesh]:
         best = start
-        for name, points in steps(quadratic, start.points, limits, floor, budget):
-            best = start.with_points(points)
-            yield best, clock.record(name, best)
-        if best.check(threads)[0] == 0:
+        if others is not None:
+            for name, points in steps(others, start.points, limits, None if hopeless.any() else floor, budget):
+                best = start.with_points(points)
+                yield best, clock.record(name, best)
+        left = best.judge_curved(threads)[0]
+        if not left.any():
             return
         found.append(best)
+        left[quadratic.rows[proofs_of_curved(best, quadratic, threads) > 0]] = False
+        if not left.any():
+            break
     best = min(found, key=lambda one: _rank(one, threads))
     if relax and budget.take():
         given = relaxed(quadratic, best.points, limits, quadratic.giving)

@@ -79,7 +79,7 @@ def umbrella(corners: Array) -> Array:
     return np.asarray(corners[0] + (own[3:] - own[0]) @ np.linalg.inv(ways) @ there)
 
 
-def test_an_element_with_a_pinched_face_is_named() -> None:
+def test_an_element_with_a_pinched_face_is_named_and_does_not_hold_up_others() -> None:
     """The proofs of the kernels, at places of a lattice, do not tell it."""
     points, rows = straight("tetra10")
     element, outer = type_of("tetra10"), ((points == 0) | (points == 1)).any(axis=1)
@@ -94,3 +94,4 @@ def test_an_element_with_a_pinched_face_is_named() -> None:
     assert row in find_obstacles(mesh).inverted
     outcome = Method(smooth=0).solve(mesh, math.inf, 1)
     assert outcome.obstacles.inverted.tolist() == [row]
+    assert np.flatnonzero(outcome.after.judge_curved()[0]).tolist() == [row]

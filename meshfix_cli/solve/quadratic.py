@@ -298,6 +298,9 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
         moved = start.copy()
         moved[held] = points[held] + shares[held, None] * way[held]
         run = _Run(mesh, moved, limits)
+        proved = run.now.invalid & (proofs_of_curved(mesh, moved, limits.free, limits.threads) > 0)
+        if proved.any():  # to try would be in vain
+            return start, proved
         for _ in run.untangle(RELAXING_RINGS):
             pass
         return run.points, run.now.invalid
@@ -357,7 +360,7 @@ def curved_steps(
     yield mesh, first
     best, found = mesh, [mesh]
     # The programme and the energy would try in vain, and not see what becomes of others.
-    hopeless = proofs_of_curved(mesh, quadratic, threads) == 1
+    hopeless = proofs_of_curved(quadratic, mesh.points, limits.free, threads) == 1
     others = None if hopeless.all() else quadratic.part(~hopeless) if hopeless.any() else quadratic
     if _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
@@ -376,7 +379,7 @@ def curved_steps(
         if not left.any():
             return
         found.append(best)
-        left[quadratic.rows[proofs_of_curved(best, quadratic, threads) > 0]] = False
+        left[quadratic.rows[proofs_of_curved(quadratic, best.points, limits.free, threads) > 0]] = False
         if not left.any():
             break
     best = min(found, key=lambda one: _rank(one, threads))

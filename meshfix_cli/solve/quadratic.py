@@ -39,7 +39,7 @@ POOR_JACOBIAN = 0.2  # scaled, at nodes
 STEP, LEAST_STEP = 0.1, 0.02  # of the floor
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
-RELAXING_RINGS = (1,)
+RELAXING_RINGS, RELAXING_SWEEPS = (1,), 8  # more of these seldom help where nodes have not given way enough
 RELAXED = 0.1  # share of the way to the middle by which held nodes give way at a time
 HALVINGS = 5  # that look for a smaller share
 
@@ -297,7 +297,7 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
     def solved(start: Array, shares: Array) -> tuple[Array, Mask]:
         moved = start.copy()
         moved[held] = points[held] + shares[held, None] * way[held]
-        run = _Run(mesh, moved, limits)
+        run = _Run(mesh, moved, limits, Budget(RELAXING_SWEEPS))
         proved = run.now.invalid & (proofs_of_curved(mesh, moved, limits.free, limits.threads) > 0)
         if proved.any():  # to try would be in vain
             return start, proved

@@ -26,6 +26,7 @@ HIGHEST = 6  # order of which anything is proved: beyond, rounding has a part in
 NEWTON = 12  # steps
 BOX = 1e-6  # of the parameters, half the width
 ROUNDED = 1e-13  # relative to the face: what a derivative may be off by
+TURNED = 0.3  # of the largest height of a normal over the mean of all: where none is lower, no place is looked for
 PER_ITEM = 4096  # problems that are solved at once
 
 
@@ -106,14 +107,25 @@ def _are_pinched(face: _Face, places: Array) -> Mask:
     """Tell it of faces with nodes (f, k, 3)."""
     places = places - places.mean(axis=1, keepdims=True)
     size = np.abs(places).max(axis=(1, 2), initial=np.finfo(float).tiny)
-    sums = face.from_nodes @ (places / size[:, None, None])
-    found, some = np.zeros(len(sums), dtype=bool), max(PER_ITEM // len(face.starts), 1)
+    every = face.from_nodes @ (places / size[:, None, None])
+    found, some = np.zeros(len(every), dtype=bool), max(PER_ITEM // len(face.starts), 1)
+    turned = np.flatnonzero(_turns(face, every))
+    sums = every[turned]
     for first in range(0, len(sums), some):
         here = sums[first : first + some]
         of = np.repeat(np.arange(len(here)), len(face.starts))
         proved = _proved(face, here[of], *_zeros(face, here[of], np.tile(face.starts, (len(here), 1))))
-        np.logical_or.at(found, first + of, proved)
+        np.logical_or.at(found, turned[first + of], proved)
     return found
+
+
+def _turns(face: _Face, sums: Array) -> Mask:
+    """Tell of faces (f, k, 3) whether normals nearly vanish against their mean, or point backwards; others are well."""
+    lower = np.maximum(face.powers - np.eye(2, dtype=int)[:, None], 0)
+    slopes = face.powers.T[:, None] * (face.starts[:, None] ** lower[:, None]).prod(axis=-1)
+    normals = np.cross(slopes[0] @ sums, slopes[1] @ sums)
+    heights = (normals * normals.mean(axis=1, keepdims=True)).sum(axis=2)
+    return np.asarray(heights.min(axis=1) < TURNED * heights.max(axis=1))
 
 
 def _derivatives(face: _Face, weights: Array, direction: Array) -> tuple[Array, NDArray[np.intp]]:

@@ -45,10 +45,12 @@ class QuadraticMesh:
         reach: float,
         goal: float,
         tied: bool,
+        halvings: int = 0,
     ) -> tuple[Float64, int]:
         """One sweep of the linear programme over nodes (k,): the points (n, d) after it, and how many nodes moved.
 
-        It visits those that have a coefficient below the goal; `tied`: nodes between go along with them.
+        It visits those that have a coefficient below the goal; `tied`: nodes between go along with them. Elements with
+        such a coefficient are halved so many times, and the coefficients are those of the parts.
         """
     def impossible(self, points: Float64, free: Uint8) -> Uint8:
         """Mark elements (m,) that cannot be valid while fixed nodes stay: 1 by themselves, 2 together with others.

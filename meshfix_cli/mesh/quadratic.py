@@ -135,6 +135,18 @@ class Quadratic:
     def __len__(self) -> int:
         return len(self.codes)
 
+    def part(self, elements: Mask) -> Quadratic:
+        """Return marked elements (m,) alone, those of one type behind the other; nodes stay as free as they are."""
+        blocks, rows = [], []
+        for code in np.unique(self.codes[elements]):
+            some = np.flatnonzero(elements & (self.codes == code))
+            count = self.types[code].nodes
+            blocks.append((self.types[code].key, self.nodes[self.offsets[some][:, None] + np.arange(count)]))
+            rows.append(self.rows[some])
+        found = Quadratic(blocks, self.n, np.concatenate(rows), self.ties)
+        found.free, found.giving = self.free, self.giving
+        return found
+
     def judge(self, points: Array, threads: int) -> Judgement:
         """Look at all elements at positions (n, d) of all points."""
         return Judgement(*self.kernel.judge(points, threads))

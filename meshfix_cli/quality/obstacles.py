@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import distinct
+from meshfix_cli.quality.pinched import pinched
 
 if TYPE_CHECKING:
-    from meshfix_cli.mesh.quadratic import Quadratic
+    from meshfix_cli.mesh.quadratic import Mask, Quadratic
 
 Array = NDArray[np.float64]
 
@@ -138,8 +140,7 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
     Inverted are those that are so wherever free nodes go; they exclude each other where one free node, or one free edge
     at an end of it, is common to them, and no position or tangent of it makes all of them valid.
     """
-    free = mesh.movable | quadratic.free
-    proofs = quadratic.kernel.impossible(mesh.points, free.astype(np.uint8))
+    proofs = proofs_of_curved(quadratic, mesh.points, mesh.movable | quadratic.free, threads)
     straight = find_obstacles(replace(mesh, quadratic=None), threads)
     alone, together = quadratic.rows[proofs == 1], np.sort(quadratic.rows[proofs == 2]).astype(np.int32)
     alone = np.union1d(alone, np.setdiff1d(straight.inverted, quadratic.rows)).astype(np.int32)
@@ -147,6 +148,14 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
     bent[quadratic.rows] = quadratic.bent(mesh.points)
     crossing, folding = (pairs[~bent[pairs].any(axis=1)] for pairs in (straight.crossing, straight.folding))
     return Obstacles(alone, together, crossing, folding, straight.overlapping[~bent[straight.overlapping]])
+
+
+def proofs_of_curved(quadratic: Quadratic, points: Array, free: Mask, threads: int) -> NDArray[np.uint8]:
+    """Mark curved elements (k,) that are not valid wherever free nodes go: 1 by themselves, 2 together with others."""
+    proofs = quadratic.kernel.impossible(points, free.astype(np.uint8))
+    asked = (quadratic.judge(points, threads).verdicts != VALID) & (proofs == 0)
+    proofs[pinched(quadratic, points, free, asked)] = 1
+    return proofs
 
 
 def _meeting(

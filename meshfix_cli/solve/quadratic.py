@@ -22,6 +22,7 @@ import numpy as np
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
+from meshfix_cli.quality.obstacles import proofs_of_curved
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
 
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
 
 CYCLES = 6  # of the linear programme
+CUTS = 3  # of what is invalid then, into parts half as large
 BARELY = 1e-3  # relative to the straight element: up to there the programme raises coefficients
 RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
 MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
@@ -39,10 +41,11 @@ STEP, LEAST_STEP, NEARLY = 0.1, 0.02, 0.999  # of the floor; the last is this sh
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
 RAISING_GAIN = 0.5  # share of what is missing by which a minimisation comes nearer, or the floor is out of reach
-RELAXING_RINGS = (1,)
+RELAXING_RINGS, RELAXING_SWEEPS = (1,), 8  # more of these seldom help where nodes have not given way enough
 RELAXED = 0.1  # share of the way to the middle by which held nodes give way at a time
 HALVINGS = 5  # that look for a smaller share
 
+PARTS = "LP on coefficients of parts"
 PROGRAMMES, ENERGY, RAISING = "LP on coefficients", "energy of coefficients", f"{SMOOTHING} curved elements"
 RELAXING = "curved boundary gives way"
 
@@ -172,10 +175,22 @@ class _Run:
         if best[1] is not self.points:
             yield from self._try(PROGRAMMES, best[1])
 
-    def _relocated(self, points: Array, nodes: Mask, tied: bool) -> Array:
+    def of_parts(self) -> Iterator[Step]:
+        """The same over the nodes of invalid elements, with coefficients of their parts: those are nearer to det J."""
+        corners, points, invalid = self.mesh.corners, self.points, self.now.invalid
+        for _ in range(CYCLES):
+            for some, tied in ((~corners, False), (corners, True)):
+                nodes = self.free & some & self.mesh.of(invalid)
+                if self.left == 0 or not (nodes.any() and self.budget.take()):
+                    continue
+                points = self._relocated(points, nodes, tied, CUTS)
+                yield from self._try(PARTS, points)
+                invalid = self.mesh.judge(points, self.limits.threads).verdicts != VALID
+
+    def _relocated(self, points: Array, nodes: Mask, tied: bool, halvings: int = 0) -> Array:
         free, rows = self.free.astype(np.uint8), np.flatnonzero(nodes).astype(np.int32)
         start, reach = self.limits.start, self.limits.max_move
-        return self.mesh.kernel.relocate(points, self.sizes, free, rows, start, reach, BARELY, tied)[0]
+        return self.mesh.kernel.relocate(points, self.sizes, free, rows, start, reach, BARELY, tied, halvings)[0]
 
     def _energy(self, region: Mask) -> kernels.QuadraticEnergy:
         limits, free = self.limits, region.astype(np.uint8)
@@ -302,7 +317,10 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
     def solved(start: Array, shares: Array) -> tuple[Array, Mask]:
         moved = start.copy()
         moved[held] = points[held] + shares[held, None] * way[held]
-        run = _Run(mesh, moved, limits)
+        run = _Run(mesh, moved, limits, Budget(RELAXING_SWEEPS))
+        proved = run.now.invalid & (proofs_of_curved(mesh, moved, limits.free, limits.threads) > 0)
+        if proved.any():  # to try would be in vain
+            return start, proved
         for _ in run.untangle(RELAXING_RINGS):
             pass
         return run.points, run.now.invalid
@@ -361,6 +379,7 @@ def curved_steps(
     first = clock.record("input", mesh)
     yield mesh, first
     best, found = mesh, [mesh]
+    hopeless = proofs_of_curved(quadratic, mesh.points, limits.free, threads) == 1
     if _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
@@ -370,12 +389,15 @@ def curved_steps(
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
     for start in [best] if best is mesh or best.check(threads)[0] < first.inverted else [best, mesh]:
         best = start
-        for name, points in steps(quadratic, start.points, limits, floor, budget):
-            best = start.with_points(points)
+        for name, best in _mended(start, hopeless, limits, floor, budget):
             yield best, clock.record(name, best)
-        if best.check(threads)[0] == 0:
+        left = best.judge_curved(threads)[0]
+        if not left.any():
             return
         found.append(best)
+        left[quadratic.rows[proofs_of_curved(quadratic, best.points, limits.free, threads) > 0]] = False
+        if not left.any():
+            break
     best = min(found, key=lambda one: _rank(one, threads))
     if relax and budget.take():
         given = relaxed(quadratic, best.points, limits, quadratic.giving)
@@ -387,6 +409,31 @@ def curved_steps(
                 yield best, clock.record(name, best)
     if clock.points is not best.points:
         yield best, clock.record("best", best)
+
+
+def _mended(
+    mesh: Mesh, hopeless: Mask, limits: Limits, floor: float | None, budget: Budget
+) -> Iterator[tuple[str, Mesh]]:
+    """Yield what is done to curved elements but hopeless ones (k,), and the mesh after it; see `steps`.
+
+    The programme and the energy would try to mend these in vain, and not see what becomes of others.
+    """
+    quadratic, threads = mesh.quadratic, limits.threads
+    assert quadratic is not None
+    if not hopeless.all():
+        others = quadratic.part(~hopeless) if hopeless.any() else quadratic
+        for name, points in steps(others, mesh.points, limits, None if hopeless.any() else floor, budget):
+            mesh = mesh.with_points(points)
+            yield name, mesh
+    invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
+    if not (invalid & ~hopeless).any():
+        return
+    proved = hopeless | (proofs_of_curved(quadratic, mesh.points, limits.free, threads) > 0)
+    if (invalid & ~proved).any():
+        run = _Run(quadratic.part(~(hopeless | (invalid & proved))), mesh.points, limits, budget)
+        for name, points in run.of_parts():
+            mesh = mesh.with_points(points)
+            yield name, mesh
 
 
 def _rank(mesh: Mesh, threads: int) -> tuple[int, float]:

@@ -257,6 +257,28 @@ def test_the_programme_of_a_node_against_highs(random: np.random.Generator, key:
             assert reached == pytest.approx(best.x[d], abs=1e-8)
 
 
+@every
+def test_the_programme_of_parts_makes_det_j_positive_in_more(random: np.random.Generator, key: str) -> None:
+    """Its optimum is between that of whole elements and that of det J at places, as HiGHS finds it."""
+    mesh, node, places = mesh_of(key), type_of(key).shape.corners, lattice(key)
+    visited = np.array([node], dtype=np.int32)
+    others = dependence(random, key, places)[:, node]
+    seen = 0
+    for nodes in doubtful(random, key, 12):
+        sizes, free = mesh.sizes(nodes, 1), np.ones(len(nodes), dtype=np.uint8)
+        most = optimum(key, nodes, [list(range(len(nodes)))], node, [places[others]])
+        reached = []
+        for halvings in (0, 3):
+            moved, count = mesh.relocate(nodes, sizes, free, visited, nodes, ANYWHERE, 1.0, False, halvings)
+            if not count:
+                break
+            value = jacobians(key, moved, places[others]).min()
+            assert min(value, 1.0) <= most + 1e-9
+            reached.append(value)
+        seen += len(reached) == 2 and reached[1] > reached[0] + 1e-9
+    assert seen
+
+
 @pytest.mark.parametrize("tied", [False, True])
 def test_a_sweep_of_the_programme_stays_in_reach(random: np.random.Generator, tied: bool) -> None:
     mesh, nodes = mesh_of("tetra10"), perturbed(random, "tetra10", 0.2)

@@ -7,7 +7,9 @@ import math
 import numpy as np
 import pytest
 from bent import FAMILIES, curved, mesh_of, straight
+from monomials import perturbed
 from numpy.typing import NDArray
+from scipy.optimize import linprog
 
 from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Quadratic
@@ -110,6 +112,25 @@ def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
     curved_ones = summarise(relaxing.after).curved
     assert curved_ones is not None
     assert curved_ones.smallest > 0
+
+
+def test_what_has_negative_coefficients_wherever_its_node_goes_becomes_valid_all_the_same() -> None:
+    """One node is free: by the programme, as HiGHS finds it, no position makes all coefficients positive."""
+    random, rows, seen = np.random.default_rng(0), np.arange(10, dtype=np.int32)[None], 0
+    quadratic, free = Quadratic([("tetra10", rows)], 10), np.arange(10) == 9
+    for _ in range(200):
+        points = perturbed(random, "tetra10", 0.1)
+        if quadratic.judge(points, 1).verdicts[0] == VALID:
+            continue
+        columns, values = quadratic.kernel.columns(points, free.astype(float)), quadratic.kernel.coefficients(points)
+        best = linprog(
+            [0, 0, 0, -1], np.column_stack([-columns, np.ones(20)]), values, bounds=[*[(-9, 9)] * 3, (None, 1)]
+        )
+        outcome = Method(smooth=0).solve(mesh_of(quadratic, points, "tetra10", rows, free), math.inf, 1)
+        if best.x[3] > 1e-2:
+            assert outcome.valid
+        seen += outcome.valid and best.x[3] < -1e-6
+    assert seen
 
 
 def test_tangled_corners_are_mended_first_and_nodes_go_along() -> None:

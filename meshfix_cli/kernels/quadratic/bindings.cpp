@@ -87,11 +87,11 @@ auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, 
 
 auto relocate_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
                  const Vector<const std::uint8_t>& free, const Vector<const std::int32_t>& nodes, const Matrix<const double>& start, double reach,
-                 double goal, bool tied) {
+                 double goal, bool tied, int halvings) {
     std::vector<double> moved(points.data(), points.data() + points.size());
     const std::int64_t count = with_room(self, points.shape(1), [&](auto dimension, auto room) {
         constexpr int D = dimension;
-        QuadraticSweep<D, decltype(room)> sweep(self, moved.data(), sizes.data(), free.data(), {start.data(), reach}, goal, tied);
+        QuadraticSweep<D, decltype(room)> sweep(self, moved.data(), sizes.data(), free.data(), {start.data(), reach}, goal, tied, halvings);
         return sweep.visit(nodes.data(), static_cast<std::int64_t>(nodes.shape(0)));
     });
     return std::make_pair(to_numpy(std::move(moved), points.shape(1)), count);
@@ -198,7 +198,7 @@ void bind_quadratic(nb::module_& m) {
         .def("sizes", &sizes_py, "points"_a.noconvert(), "threads"_a)
         .def("smallest", &smallest_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "of_free"_a, "threads"_a)
         .def("relocate", &relocate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "nodes"_a.noconvert(),
-             "start"_a.noconvert(), "reach"_a, "goal"_a, "tied"_a)
+             "start"_a.noconvert(), "reach"_a, "goal"_a, "tied"_a, "halvings"_a = 0)
         .def("impossible", &impossible_py, "points"_a.noconvert(), "free"_a.noconvert());
     nb::class_<PyQuadraticEnergy>(m, "QuadraticEnergy")
         .def("__init__", &init_energy, "mesh"_a, "points"_a.noconvert(), "rest"_a.noconvert(), "sizes"_a.noconvert(),

@@ -93,12 +93,15 @@ struct QuadraticParts {
 
     // The gradients of all coefficients by the displacement x of some nodes, each of which moves by `share` x.
     std::array<Vec<D>, R::COEFFICIENTS> gradients(const std::array<double, R::NODES>& share) const {
+        std::array<double, R::NODES> of_control;
+        for (int c = 0; c < type->controls; ++c) of_control[c] = weighted(type->control_of_nodes[c], share);
+        return gradients_of_controls(of_control);
+    }
+
+    // The same where each control point moves by its share.
+    std::array<Vec<D>, R::COEFFICIENTS> gradients_of_controls(const std::array<double, R::NODES>& of_control) const {
         std::array<std::array<double, R::DIFFERENCES>, 3> moves;
         for (int j = 0; j < D; ++j) clear(moves[j], size(j));
-        std::array<double, R::NODES> of_control;
-        clear(of_control, type->controls);
-        for (int c = 0; c < type->controls; ++c)
-            for (const Share& one : type->control_of_nodes[c]) of_control[c] += one.weight * share[one.of];
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < type->difference[j].size(); ++p)
                 for (const Share& one : type->difference[j][p]) moves[j][p] += one.weight * of_control[one.of];
@@ -129,9 +132,9 @@ struct QuadraticParts {
         return found;
     }
 
-    template <std::size_t N>
-    static Vec<D> weighted(const Sum& sum, const std::array<Vec<D>, N>& values) {
-        Vec<D> total{};
+    template <class T, std::size_t N>
+    static T weighted(const Sum& sum, const std::array<T, N>& values) {
+        T total{};
         for (const Share& one : sum) total = total + one.weight * values[one.of];
         return total;
     }
@@ -202,6 +205,11 @@ struct QuadraticPart {
     QuadraticNodes<D, R> control;
     std::array<double, 6> length2;  // for each way to halve
 
+    // The way that halves the longest edge.
+    std::size_t longest(const QuadraticType& type) const {
+        return static_cast<std::size_t>(std::max_element(length2.begin(), length2.begin() + type.cut.size()) - length2.begin());
+    }
+
     // The half by edge `k` in which the end `kept` stays and the other one is the middle.
     QuadraticPart half(const QuadraticType& type, std::size_t k, int kept) const {
         const auto& cut = type.cut;
@@ -236,8 +244,8 @@ bool is_positive(const QuadraticParts<D, R>& whole) {
         for (const int corner : type.corner_coefficient)
             if (!(parts.coefficient[corner] > 0.0)) return false;
         if (seen == QUADRATIC_PARTS) return false;
-        const auto longest = std::max_element(part.length2.begin(), part.length2.begin() + type.cut.size()) - part.length2.begin();
-        for (int kept = 0; kept < 2; ++kept) waiting.push_back(part.half(type, static_cast<std::size_t>(longest), kept));
+        const std::size_t longest = part.longest(type);
+        for (int kept = 0; kept < 2; ++kept) waiting.push_back(part.half(type, longest, kept));
     }
     return true;
 }

@@ -11,13 +11,14 @@
 namespace meshfix {
 
 // What a sweep does: nodes whose elements have a coefficient below the goal, relative to the size, are visited one after the
-// other. `tied`: nodes of edges and faces go along with the corners that they are means of.
+// other. `tied`: nodes of edges and faces go along with the corners that they are means of. Elements with such a coefficient are
+// halved so many times: those of their parts are nearer to det J.
 template <int D, class R>
 class QuadraticSweep {
    public:
     QuadraticSweep(const QuadraticMesh& mesh, double* points, const double* sizes, const std::uint8_t* free, QuadraticReach reach,
-                   double goal, bool tied)
-        : mesh_(&mesh), points_(points), sizes_(sizes), free_(free), reach_(reach), goal_(goal), tied_(tied) {}
+                   double goal, bool tied, int halvings)
+        : mesh_(&mesh), points_(points), sizes_(sizes), free_(free), reach_(reach), goal_(goal), tied_(tied), halvings_(halvings) {}
 
     // Visits nodes (k), corners or others; returns how many moved.
     std::int64_t visit(const std::int32_t* nodes, std::int64_t count) {
@@ -38,7 +39,7 @@ class QuadraticSweep {
         const Vec<D> here = load<D>(points_ + static_cast<std::int64_t>(v) * D);
         functions_.clear();
         neighbours_.clear();
-        double radius = 0.0, smallest = INFINITY;
+        double radius = 0.0;
         for (const Touched& one : touched_) {
             const QuadraticType& type = mesh_->type(one.element);
             QuadraticNodes<D, R> nodes;
@@ -48,20 +49,42 @@ class QuadraticSweep {
                 radius = std::max(radius, std::sqrt(norm2(nodes[k])));
             }
             const QuadraticParts<D, R> parts(type, nodes);
-            const auto gradients = parts.gradients(one.share);
+            std::array<double, R::NODES> share;
+            for (int c = 0; c < type.controls; ++c) share[c] = parts.weighted(type.control_of_nodes[c], one.share);
             const double scale = 1.0 / sizes_[one.element];
-            double longest2 = 0.0;
-            for (int i = 0; i < type.coefficients; ++i) longest2 = std::max(longest2, norm2(gradients[i]));
-            for (int i = 0; i < type.coefficients; ++i) {
-                if (!(norm2(gradients[i]) > LP_PINNED2 * longest2)) continue;
-                functions_.push_back({scale * parts.coefficient[i], scale * gradients[i]});
-                smallest = std::min(smallest, functions_.back().value);
-            }
+            if (halvings_ > 0 && scale * parts.smallest() < goal_)
+                add_halves({parts.control, {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}}, share, type, scale, halvings_);
+            else
+                add(parts, share, scale);
         }
+        double smallest = INFINITY;
+        for (const auto& function : functions_) smallest = std::min(smallest, function.value);
         if (!(smallest < goal_) || functions_.empty()) return false;
         program_.set(neighbours_, radius, functions_, false);
         if (program_.solve() != LpStatus::optimal || !(program_.pi[D] > smallest + QUADRATIC_GAIN)) return false;
         return move(program_.position());
+    }
+
+    // Adds the coefficients that depend on the node, where the control points move by their shares.
+    void add(const QuadraticParts<D, R>& parts, const std::array<double, R::NODES>& share, double scale) {
+        const auto gradients = parts.gradients_of_controls(share);
+        const int count = parts.type->coefficients;
+        double longest2 = 0.0;
+        for (int i = 0; i < count; ++i) longest2 = std::max(longest2, norm2(gradients[i]));
+        for (int i = 0; i < count; ++i)
+            if (norm2(gradients[i]) > LP_PINNED2 * longest2) functions_.push_back({scale * parts.coefficient[i], scale * gradients[i]});
+    }
+
+    // Those of the halves of a part of an element, and of their halves; in the parameters each is half as large as the part.
+    void add_halves(const QuadraticPart<D, R>& part, const std::array<double, R::NODES>& share, const QuadraticType& type, double scale,
+                    int halvings) {
+        if (halvings == 0) return add(QuadraticParts<D, R>::of_controls(type, part.control), share, scale);
+        const std::size_t longest = part.longest(type);
+        for (int kept = 0; kept < 2; ++kept) {
+            std::array<double, R::NODES> of_half;
+            for (int c = 0; c < type.controls; ++c) of_half[c] = QuadraticParts<D, R>::weighted(type.halves[longest][kept][c], share);
+            add_halves(part.half(type, longest, kept), of_half, type, 2.0 * scale, halvings - 1);
+        }
     }
 
     // The node, and those that are tied to it, in all of their elements.
@@ -132,6 +155,7 @@ class QuadraticSweep {
     QuadraticReach reach_;
     double goal_;
     bool tied_;
+    int halvings_;
     std::vector<Touched> touched_;
     std::vector<std::pair<std::int32_t, double>> moving_;
     std::vector<Vec<D>> neighbours_;

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
 
 CYCLES = 6  # of the linear programme
-CUTS = 3  # of what is invalid then, into parts half as large
+CUTS = (3, 3, 3, 6, 6, 6)  # of what is invalid then, into parts half as large, in each cycle
 BARELY = 1e-3  # relative to the straight element: up to there the programme raises coefficients
 RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
 MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
@@ -178,12 +178,12 @@ class _Run:
     def of_parts(self) -> Iterator[Step]:
         """The same over the nodes of invalid elements, with coefficients of their parts: those are nearer to det J."""
         corners, points, invalid = self.mesh.corners, self.points, self.now.invalid
-        for _ in range(CYCLES):
+        for cuts in CUTS:
             for some, tied in ((~corners, False), (corners, True)):
                 nodes = self.free & some & self.mesh.of(invalid)
                 if self.left == 0 or not (nodes.any() and self.budget.take()):
                     continue
-                points = self._relocated(points, nodes, tied, CUTS)
+                points = self._relocated(points, nodes, tied, cuts)
                 yield from self._try(PARTS, points)
                 invalid = self.mesh.judge(points, self.limits.threads).verdicts != VALID
 

@@ -85,7 +85,7 @@ EXAMPLES ?= 5000
 fuzz: $(VENV)/developer ## read EXAMPLES=5000 broken files of every format, and judge as many meshes with a fault
 	MESHFIX_FUZZ=$(EXAMPLES) $(BIN)/pytest tests/meshfile/test_fuzz.py tests/meshfile/test_verdicts.py
 
-stress: $(VENV)/installed ## untangle 477 hard cases; which are solved, how fast and how well
+stress: $(VENV)/installed ## untangle 473 hard cases, and four impossible ones; which are solved, how fast and how well
 	$(BIN)/python benchmarks/stress.py
 
 bench: $(VENV)/installed ## kernels, MESH=FILE for a mesh of yours; the process up to 10 million tets; files; many meshes

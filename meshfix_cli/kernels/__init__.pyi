@@ -335,14 +335,15 @@ def foldover_energy(
     """Energy, its gradient (free, d) by the first `free` points, and the smallest determinant of J; see `Foldover`."""
 
 def shape_energy(
-    points: Float64, simplices: Int32, corners: Float64, owners: Int32, free: int, goal: float, floor: float,
-    measure: float, weight: float, sharpness: float, evenness: float, threads: int,
+    points: Float64, simplices: Int32, corners: Float64, owners: Int32, hexahedra: Int32, free: int, goal: float,
+    floor: float, measure: float, weight: float, sharpness: float, evenness: float, threads: int,
     freedom: Freedom | None = None, angle: float = ...,
 ) -> tuple[float, Float64]:  # fmt: skip
     """Energy of moves/shape.hpp and its gradient (free, d), in a unit of about an edge.
 
     Simplices that are corners of elements have their weights in `corners` (m,), others 0; (0,): none is a corner. The
-    elements of the simplices are `owners` (m,), one behind the other; (0,) will do where the sharpness is 0.
+    elements of the simplices are `owners` (m,), one behind the other; (0,) will do where the sharpness is 0. Of each of
+    these elements `hexahedra` (e, 8) has the nodes, if its centre counts as one more corner, else -1; (0, 8): of none.
     """
 
 def shaped(
@@ -350,6 +351,7 @@ def shaped(
     simplices: Int32,
     corners: Float64,
     owners: Int32,
+    hexahedra: Int32,
     free: int,
     goal: float,
     floor: float,

@@ -28,7 +28,7 @@ STEPS = 2.0**32  # of 1: sums of integers do not depend on their order
 HALVINGS = 8  # of the way of what is worse; then it goes all the way back
 RETREATS = 20
 KEPT = 0.9  # of the first percentile of the default: what others gain may cost it so much
-STALL = 0.01  # of the score: two candidates that gain no more, a turn, are the last of their kind
+STALL = 0.01  # of the score: candidates that gain no more in their last turns are the last of their kind
 MEAN = 5.0  # what the mean counts, and the smallest 1: it is that of all elements, and seldom gains much
 SAME = 1e-9  # by which a smallest value may be smaller
 
@@ -78,14 +78,20 @@ class Compared:
             self._least = (*map(max, figures[:2], self._least[:2]), *self._least[2:])
         return points
 
+    def take_best(self) -> Array:
+        """Return the best one's points, as if it were the last."""
+        if self._last is not self.best:
+            self._last, self._values = self.best, self._jacobians(self.best)
+        return self.best
+
     def is_better(self, points: Array, others: Array) -> bool:
         """Whether neither the smallest nor the mean of the scaled Jacobians is below that of the others (n, d)."""
         (smallest, _, mean, *_), (its_smallest, _, its_mean, *_) = (self._judged(one)[1] for one in (points, others))
         return smallest >= its_smallest and mean >= its_mean
 
-    def stalls(self) -> bool:
-        """Whether the last two, a turn, gained little."""
-        return sum(max(rise, 0.0) for rise in self.rises[-2:]) < STALL
+    def stalls(self, turns: int) -> bool:
+        """Whether the last turns, of two each, gained little."""
+        return sum(max(rise, 0.0) for rise in self.rises[-2 * turns :]) < STALL
 
     def _will_do(self, figures: Figures) -> bool:
         return all(one >= least - SAME for one, least in zip(figures, self._least, strict=True))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.solve.foldover import evened
 from meshfix_cli.solve.region import Region
-from meshfix_cli.solve.shape import FEW_ITERATIONS, Goal, corner_weights, shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, SHARP, SHARP_WEIGHT, Goal, corner_weights, shaped
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
@@ -65,7 +65,7 @@ def evened_where_poor(
     if smallest < (POOR_OF_UNEVEN if uneven else POOR) * min(mean, ceiling(points, stars, free)):
         even = evened(points, stars, free, threads, ITERATIONS, freedom)
         yield shaped(even, stars, free, goal, threads, FEW_ITERATIONS, freedom)
-        held = replace(goal, floor=math.degrees(math.asin(smallest)) + LIFT, sharp=True)
+        held = replace(goal, floor=math.degrees(math.asin(smallest)) + LIFT, stages=SHARP, weight=SHARP_WEIGHT)
         yield shaped(even, stars, free, held, threads, SHARP_ITERATIONS, freedom)
 
 

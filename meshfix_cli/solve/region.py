@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.mesh.elements import ELEMENTS, JUDGED
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.mesh.topology import distinct
 
 Array = NDArray[np.float64]
 RETREATS = 20
+HEXAHEDRON = JUDGED.index(ELEMENTS["hexahedron"])
 
 
 class Region:
@@ -41,12 +43,36 @@ class Region:
         number[self.vertices] = np.arange(len(self.vertices), dtype=np.int32)
         self.simplices = number[simplices]
         self.elements = None if mesh.simplicial else Judged(mesh, distinct(mesh.owners[self.rows]))
-        self._mesh = mesh
+        self._mesh, self._number = mesh, number
 
     @property
     def global_simplices(self) -> NDArray[np.int32]:
         """(s, d+1) int32: the simplices of the stars in the numbers of the mesh; made each time, as they are large."""
         return self._mesh.simplices[self.rows]
+
+    def hexahedra(self) -> tuple[NDArray[np.intp], NDArray[np.int32]]:
+        """Return the vertices (k + r,) with those of hexahedra that are not in the stars, and the nodes of these.
+
+        Returns
+        -------
+        vertices : (k + r,) int
+            In the numbers of the mesh.
+        nodes : (e, 8) int32
+            Of each of the elements, in the numbers of these vertices, or -1 if it is no hexahedron; (0, 8): none is.
+        """
+        if self.elements is None:
+            return self.vertices, np.empty((0, 8), dtype=np.int32)
+        rows = self.elements.rows
+        found = self._mesh.codes[rows] == HEXAHEDRON
+        if not found.any():
+            return self.vertices, np.empty((0, 8), dtype=np.int32)
+        nodes = self._mesh.nodes[self._mesh.node_offsets[rows[found], None] + np.arange(8)]
+        more = np.unique(nodes[self._number[nodes] < 0])
+        number = self._number.copy()
+        number[more] = len(self.vertices) + np.arange(len(more), dtype=np.int32)
+        table = np.full((len(rows), 8), -1, dtype=np.int32)
+        table[found] = number[nodes]
+        return np.concatenate([self.vertices, more]), table
 
     def retreated(self, start: Array, moved: Array, least: float, threads: int) -> Array:
         """Return moved points (n, d) where no element of the region is inverted, and none gets very small.

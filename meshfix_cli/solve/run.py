@@ -16,7 +16,16 @@ from meshfix_cli import kernels
 from meshfix_cli.solve.passes import Passes
 from meshfix_cli.solve.positions import ANGLE_STEPS, GAIN, Positions, Start
 from meshfix_cli.solve.records import SweepRecord
-from meshfix_cli.solve.shape import FEW_ITERATIONS, ITERATIONS, Goal, shaped
+from meshfix_cli.solve.shape import (
+    FEW_ITERATIONS,
+    FEW_WEIGHT,
+    ITERATIONS,
+    SHARP,
+    SHARP_WEIGHT,
+    SHARPEST,
+    Goal,
+    shaped,
+)
 from meshfix_cli.solve.strategies import PASSES, Move, Phase
 
 if TYPE_CHECKING:
@@ -27,6 +36,7 @@ if TYPE_CHECKING:
 FLOOR, LIFT = 1, 3.0  # percentile of the smallest angles; up to so many degrees above it they are the few worse ones
 RAISE = 3.0  # degrees above the smallest angle at which the next sweep of "best" optimises
 RAISE_PATIENCE = 2
+FEW_LIFT, FEW_RINGS = 1.0, 2  # degrees above the smallest, and rings around what is below that, that rise together
 ROUNDING = 1e-9  # of a threshold: elements and stars are measured in different units
 PROGRESS = 1e-3  # by which the smallest measure must rise to count as progress, relative
 NEAR = 1  # rings around the vertices of inverted elements, and around what FF moved, that `only_invalid` smooths
@@ -113,6 +123,7 @@ class Run(Positions):
         self.rival: Start | None = None
         self.ahead: Passes | None = None
         self.kept: tuple[Array, SweepRecord, float] | None = None
+        self.over: frozenset[str] = frozenset()  # the kinds of turns that have stalled
         self.lost = False  # what the last minimisation of the shape began with
         self.shaped = False  # since the smallest angle was raised
         self.uneven = False  # for no reason, maybe: it was hard to untangle or to smooth
@@ -270,21 +281,33 @@ class Run(Positions):
         if self.surface is not None:
             yield from self._shape_of_surface(phase)
             return
-        if not self._count(self.together):
-            return
         angles = self._angles(self.points)
-        smallest = self._least(angles)
+        smallest, near = self._least(angles), self._smoothed(phase)
+        if phase.shapes == "few":
+            near = self._grown(self._of(angles < smallest + math.radians(FEW_LIFT)), FEW_RINGS)
+        if not self._count(near & self.together):
+            return
         self.kept = self.points, self.record, smallest
-        goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
-        floor = math.degrees(smallest) if phase.shapes in ("lost", "sharp") else 0.0
         most = self.pace.iterations if phase.shapes == "risen" else ITERATIONS
         most = FEW_ITERATIONS if phase.elements and phase.shapes == "first" else most
-        aims = Goal(goal, floor, max(self.min_measure, 0.0), sharp=phase.shapes == "sharp")
+        aims = self._aims(phase.shapes, angles)
 
         def compute(stars: kernels.Connectivity, points: Array, free: Mask) -> Iterator[Array]:
             yield shaped(points, stars, free, aims, self.threads, most, self.team.freedom)
 
-        yield from self._of_whole(compute, self.points, self._smoothed(phase) & self.together)
+        yield from self._of_whole(compute, self.points, near & self.together)
+
+    def _aims(self, shapes: str | None, angles: Array) -> Goal:
+        smallest, measure = math.degrees(self._least(angles)), max(self.min_measure, 0.0)
+        if shapes == "few":
+            target = smallest + FEW_LIFT
+            return Goal(target, target, measure, SHARP[-1:], FEW_WEIGHT)
+        if shapes == "mean":
+            return Goal(0.0, smallest, measure, SHARPEST, SHARP_WEIGHT)
+        goal = math.degrees(self.team.ranked(angles[self.own], FLOOR)) + LIFT
+        if shapes == "sharp":
+            return Goal(goal, smallest, measure, SHARP, SHARP_WEIGHT)
+        return Goal(goal, smallest if shapes == "lost" else 0.0, measure)
 
     def _shape_of_surface(self, phase: Phase) -> Iterator[Array]:
         """Yield the points where sweeps for the mean ratios end."""
@@ -329,7 +352,7 @@ class Run(Positions):
 
     def take_compared(self) -> bool:
         """Go to the best candidate; False: it is the last mesh, or there is none."""
-        return self.compared is not None and self._go_to(self.compared.best)
+        return self.compared is not None and self._go_to(self.compared.take_best())
 
     def _goes_on(self, phase: Phase) -> bool:
         """Whether a phase of smoothing has something to do after those before."""
@@ -340,10 +363,17 @@ class Run(Positions):
             return False
         if phase.shapes == "risen" and not self._has_risen():
             return False
-        if phase.shapes == "sharp" and self.compared is not None and self.compared.stalls():
+        if phase.compares and self.compared is not None and self._is_over(phase, self.compared):
             return False
         self.shaped = self.shaped or phase.shapes is not None
         return True
+
+    def _is_over(self, phase: Phase, compared: Compared) -> bool:
+        """Whether turns of its kind are over; sweeps for the mean ratios are part of the sharp ones."""
+        kind = phase.shapes or "sharp"
+        if phase.patience and compared.stalls(phase.patience):
+            self.over = self.over | {kind}
+        return kind in self.over
 
     def _has_risen(self) -> bool:
         """Whether the smallest angle has risen since the last minimisation of the shape, but not to the ceiling."""

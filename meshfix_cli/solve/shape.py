@@ -19,13 +19,15 @@ Array = NDArray[np.float64]
 
 ITERATIONS = 100  # of "best"
 FEW_ITERATIONS = 20  # of the default
-# Sharpness and evenness of minimisations, one after the other: how much more worst corners count, and what their mean
-# ratios are worth where scaled Jacobians are worth 1; see kernels/moves/shape.hpp. Without these are many valleys.
-PLAIN = ((0.0, 0.0),)
-SHARP = tuple((15.0, evenness) for evenness in (8.0, 2.4, 0.8, 0.24, 0.0))
 ANGLE_OF_SLIDING = 1.0  # what a degree is worth where the boundary slides: its elements gain more in angles
 WEIGHT = 1.0  # of an element a degree below the goal, where a mean ratio of one is worth 100
 SHARP_WEIGHT = 3.0  # of a corner, where elements are judged by their worst ones
+FEW_WEIGHT = 1000.0  # of one of the few that are raised, beside which nothing else counts
+PLAIN = (0.0, 0.0)
+# Sharpness and evenness of minimisations, one after the other: how much more worst corners count, and what their mean
+# ratios are worth where scaled Jacobians are worth 1; see kernels/moves/shape.hpp. Without these are many valleys.
+SHARP = tuple((15.0, evenness) for evenness in (8.0, 2.4, 0.8, 0.24, 0.0))
+SHARPEST = ((30.0, 0.02), (100.0, 0.0))  # from where these lead: the mean of the smallest scaled Jacobians, nearly
 
 
 @dataclass(frozen=True)
@@ -40,14 +42,18 @@ class Goal:
         Degrees; smaller angles count much more.
     measure : float
         Model units; no measure gets smaller.
-    sharp : bool
-        Whether elements are judged by their worst corners; else all corners of one count the same.
+    stages : tuple of (float, float)
+        Sharpness and evenness of minimisations, one after the other, that judge elements by their worst corners; none:
+        one, for which all corners of an element count the same.
+    weight : float
+        Of what is below the angle and the floor.
     """
 
     angle: float
     floor: float = 0.0
     measure: float = 0.0
-    sharp: bool = False
+    stages: tuple[tuple[float, float], ...] = ()
+    weight: float = WEIGHT
 
 
 def shaped(
@@ -78,13 +84,13 @@ def shaped(
     """
     region = Region(mesh, free)
     weights, owners = corner_weights(mesh, region), _owners(mesh, region)
-    weight, stages = (SHARP_WEIGHT, SHARP) if goal.sharp else (WEIGHT, PLAIN)
+    vertices, hexahedra = region.hexahedra() if goal.stages else (region.vertices, np.empty((0, 8), dtype=np.int32))
     sliding = () if freedom is None else (freedom.of(region.moving), ANGLE_OF_SLIDING)
-    for sharpness, evenness in stages:
+    for sharpness, evenness in goal.stages or (PLAIN,):
         moved = points.copy()
         moved[region.moving] = kernels.shaped(
-            points[region.vertices], region.simplices, weights, owners, len(region.moving), goal.angle, goal.floor,
-            goal.measure, weight, sharpness, evenness, iterations, threads, *sliding,
+            points[vertices], region.simplices, weights, owners, hexahedra, len(region.moving), goal.angle, goal.floor,
+            goal.measure, goal.weight, sharpness, evenness, iterations, threads, *sliding,
         )  # fmt: skip
         points = region.retreated(points, moved, goal.measure, threads)
     return points

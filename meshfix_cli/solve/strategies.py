@@ -18,7 +18,7 @@ THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for plane and solid mesh
 SMOOTHING = "smoothing"
 FEATURE_ANGLE, MAX_DEVIATION = 40.0, 0.03  # degrees, and mean edge lengths: see `curved.Smooth`
 ROUNDS = 8  # of "best", at most, after the first
-TURNS, RATIO_SWEEPS = 6, 6  # of "best" where elements are not all simplices
+TURNS, RATIO_SWEEPS, MEANS = 6, 6, 4  # of "best" where elements are not all simplices
 MORE_SWEEPS = 100  # at most, where the passes leave angles below the threshold
 # From where to where the numbers of options go, of the command line and of Python; None: there is no end.
 RANGES: dict[str, tuple[int, int | None]] = {
@@ -84,12 +84,13 @@ class Phase:
     embeds : bool
         One sweep that puts all vertices of the region at the means of their neighbours at once. It is another start,
         for meshes that Laplacian sweeps did not mend; the next phase from the best mesh takes the better one.
-    shapes : {"first", "lost", "risen", "even", "sharp"}, optional
+    shapes : {"first", "lost", "risen", "even", "sharp", "mean", "few"}, optional
         One minimisation of the shape of all elements at once, from a valid mesh. "lost": from where the last one began,
         if the smallest angle is smaller than there, with that held; "risen": if it has risen since the last one began;
         "even": where the phase before had something to do or untangling took another start, from where the
         foldover-free energy makes the sizes even, if that is better; "sharp": elements are judged by
-        their worst corners, and the smallest quality is held.
+        their worst corners, and the smallest quality is held; "mean": as well, from the best of the meshes that were
+        compared, and nothing else counts; "few": from there, the few that are little better than the worst, alone.
     to_reference : str
         Of phases without moves, the function of `towards.py` that gives the points after each sweep. Smoothing that
         has one takes the place of the other, where there is a reference or layers were followed.
@@ -103,6 +104,8 @@ class Phase:
     compares : bool
         Where elements are not all simplices, the last mesh is the best one of those after such phases, of which no
         figure is below those after the first.
+    patience : int
+        It is left out where so many turns, of two phases that compare each, have gained little; 0: it never is.
     """
 
     name: str
@@ -113,12 +116,13 @@ class Phase:
     from_best: bool = False
     rings: tuple[int | None, ...] = ()
     embeds: bool = False
-    shapes: Literal["first", "lost", "risen", "even", "sharp"] | None = None
+    shapes: Literal["first", "lost", "risen", "even", "sharp", "mean", "few"] | None = None
     to_reference: Literal["", "follow", "mend", "approach"] = ""
     layers: bool = False
     elements: bool | None = None
     slides: bool | None = None
     compares: bool = False
+    patience: int = 0
 
     @property
     def smooths(self) -> bool:
@@ -195,7 +199,17 @@ _RATIOS = Phase(
     f"{SMOOTHING} by mean ratios", (Move.MEAN_RATIO,), RATIO_SWEEPS, until="settled", elements=True, compares=True
 )
 _SHARP = replace(_SHAPE, compares=True, elements=True, shapes="sharp")
-_TURNS = (_RATIOS, *(_SHARP, _RATIOS) * TURNS)
+_FEW = replace(_SHARP, name=f"{SMOOTHING} the few worst", shapes="few")
+_MEAN = replace(_SHARP, name=f"{SMOOTHING} for the mean", shapes="mean")
+
+
+def _turns() -> Iterator[Phase]:
+    """Give the phases of both kinds of turns: a first one that gained little is the last, or two of the first kind."""
+    yield _RATIOS
+    for turn in range(TURNS):
+        yield from (replace(_SHARP, patience=min(turn, 2)), _RATIOS)
+    for turn in range(MEANS):
+        yield from (replace(phase, patience=min(turn, 1)) for phase in (_FEW, _MEAN))
 
 
 def senseless_beside_reference(only_invalid: bool, threshold: float | None) -> tuple[str, ...]:
@@ -250,7 +264,7 @@ def plan(
         default = tuple(replace(phase, elements=True) for phase in (replace(passes, rings=RINGS), *more))
         first = (*default[:-1], replace(default[-1], compares=True))
         simplicial = replace(passes, elements=False), replace(_MORE, until="goal", elements=False)
-        return (*untangling, *first, *simplicial, *_BEST, *_TURNS)
+        return (*untangling, *first, *simplicial, *_BEST, *_turns())
     if smooth == "auto":
         return (*untangling, replace(passes, rings=RINGS), *more)
     return (*untangling, replace(passes, max_sweeps=smooth))

@@ -97,7 +97,7 @@ def steps(
         untangling = not phase.smooths
         if phase.from_best and run.choose():
             yield run.mesh, run.record
-        if phase.shapes == "lost" and run.take_back():
+        if (phase.shapes == "lost" and run.take_back()) or (phase.shapes in ("mean", "few") and run.take_compared()):
             yield run.mesh, run.record
         if not run.enter(phase):
             continue

@@ -14,7 +14,7 @@ from meshfix_cli.solve.region import Region
 from meshfix_cli.solve.shape import Goal, shaped
 
 GOAL = (30.0, 12.0, 0.0, 1.5, 0.0, 0.0)  # degrees, degrees, measure, weight, sharpness, evenness
-NO_CORNERS = np.empty(0), np.empty(0, dtype=np.int32)
+NO_CORNERS = np.empty(0), np.empty(0, dtype=np.int32), np.empty((0, 8), dtype=np.int32)
 
 
 def region_of(mesh: Mesh) -> tuple[np.ndarray, Region]:

@@ -11,7 +11,7 @@ from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.solve.compared import KEPT
 from meshfix_cli.solve.even import ceiling
-from meshfix_cli.solve.shape import Goal, shaped
+from meshfix_cli.solve.shape import SHARP, SHARP_WEIGHT, Goal, shaped
 
 
 def tangled(name: str, how: str) -> Mesh:
@@ -58,18 +58,46 @@ def test_the_sharp_energy_is_between_mean_and_smallest_of_the_corners(sharpness:
     mesh = untangle(tangled("hexes of tets", "P=25 D=2h"), smooth=1).after
     stars, points = mesh.topology.stars(1), np.ascontiguousarray(mesh.along_curve(mesh.points))
     simplices, owners = stars.simplices, np.ascontiguousarray(stars.owners)
-    weights = np.ones(len(simplices))
-    energy, _ = kernels.shape_energy(points, simplices, weights, owners, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 0.0, 1)
+    weights, hexahedra = np.ones(len(simplices)), np.empty((0, 8), dtype=np.int32)
+    energy, _ = kernels.shape_energy(
+        points, simplices, weights, owners, hexahedra, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 0.0, 1
+    )
     edges = points[simplices[:, 1:]] - points[simplices[:, :1]]
     scaled = (np.linalg.det(edges) / np.linalg.norm(edges, axis=2).prod(axis=1)).reshape(-1, 8)
     soft = -np.log(np.exp(-sharpness * scaled).mean(axis=1)) / sharpness
     assert (soft <= scaled.mean(axis=1) + 1e-12).all()
     assert (soft >= scaled.min(axis=1)).all()
     assert energy == pytest.approx(-100 * 8 * soft.sum(), rel=1e-9)
-    even, _ = kernels.shape_energy(points, simplices, weights, owners, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 0.5, 1)
+    even, _ = kernels.shape_energy(
+        points, simplices, weights, owners, hexahedra, 1, 0.0, 0.0, 0.0, 1.0, sharpness, 0.5, 1
+    )
     ratios = 3 * np.linalg.det(edges) ** (2 / 3) / (edges**2).sum(axis=(1, 2))
     assert ratios.max() <= 1 + 1e-12  # a cube's corners have 1
     assert energy - even == pytest.approx(100 * 0.5 * ratios.sum(), rel=1e-6)
+
+
+def test_the_sharp_energy_counts_centres_as_corners() -> None:
+    mesh = untangle(tangled("hexes of tets", "P=25 D=2h"), smooth=1).after
+    stars, points = mesh.topology.stars(1), np.ascontiguousarray(mesh.along_curve(mesh.points))
+    simplices, owners, nodes = stars.simplices, np.ascontiguousarray(stars.owners), stars.nodes.reshape(-1, 8)
+    edges = points[simplices[:, 1:]] - points[simplices[:, :1]]
+    scaled = (np.linalg.det(edges) / np.linalg.norm(edges, axis=2).prod(axis=1)).reshape(-1, 8)
+    x = points[nodes]
+    axes = np.stack([
+        x[:, [1, 2, 5, 6]].sum(axis=1) - x[:, [0, 3, 4, 7]].sum(axis=1),
+        x[:, [2, 3, 6, 7]].sum(axis=1) - x[:, [0, 1, 4, 5]].sum(axis=1),
+        x[:, 4:].sum(axis=1) - x[:, :4].sum(axis=1),
+    ], axis=1)  # fmt: skip
+    centres = np.linalg.det(axes) / np.linalg.norm(axes, axis=2).prod(axis=1)
+    hexahedra = nodes.copy()
+    hexahedra[5] = -1  # its centre does not count
+    sums = np.exp(-15 * scaled).sum(axis=1) + np.exp(-15 * centres)
+    soft = -np.log(sums / 9) / 15
+    soft[5] = -np.log(np.exp(-15 * scaled[5]).mean()) / 15
+    energy, _ = kernels.shape_energy(
+        points, simplices, np.ones(len(simplices)), owners, hexahedra, 1, 0.0, 0.0, 0.0, 1.0, 15.0, 0.0, 1
+    )
+    assert energy == pytest.approx(-800 * soft.sum(), rel=1e-9)
 
 
 def test_a_turned_wall_leaves_no_poor_element() -> None:
@@ -89,7 +117,7 @@ def test_edges_that_have_shrunk_grow_again() -> None:
     away = np.linalg.norm(points - middle, axis=1, keepdims=True) / h
     start = np.where(free[:, None], middle + (points - middle) * np.minimum(1, (away / 3) ** 3), points)
     assert mesh.with_vertices(start).check()[0] == 0
-    after = shaped(start, stars, free, Goal(30.0, sharp=True), 1)
+    after = shaped(start, stars, free, Goal(30.0, stages=SHARP, weight=SHARP_WEIGHT), 1)
     assert mesh.with_vertices(after).check()[0] == 0
     assert corners(mesh.with_vertices(after)).mean() > 0.999 > corners(mesh.with_vertices(start)).mean()
     shortest = [np.linalg.norm(one[edges[0]] - one[edges[1]], axis=1).min() for one in (start, after)]

@@ -191,30 +191,21 @@ def freedom_of(points: Array, constraints: Constraints, smooth: Smooth | None = 
     directions = [np.full(len(slides.axes), slides.directions, dtype=np.uint8) for slides in found]
     axes = np.ascontiguousarray(np.concatenate([slides.axes for slides in found]))
     if smooth is None:
-        return Freedom(frame, np.concatenate(directions), axes, *_rows(pairs, k))
+        return Freedom(frame, np.concatenate(directions), axes, *kernels.rows_of_pairs(np.concatenate(pairs), k))
     from meshfix_cli.mesh.curved import curved_of
 
     degrees = np.append(np.concatenate(directions), np.uint8(0))
     curved = curved_of(points, constraints, smooth, degrees[frame], joints)
     mine = curved.shape >= 0
     frame[mine] = known + curved.shape[mine]
-    pairs = [*(some[~mine[some[:, 0]]] for some in pairs), curved.pairs]
+    pairs = [*(some[~mine[some[:, 0]]] for some in pairs if len(some)), curved.pairs]
     directions.append(curved.shapes.directions)
     shapes = curved.shapes if len(curved.shapes.directions) else None
-    return Freedom(frame, np.concatenate(directions), axes, *_rows(pairs, k), shapes)
+    return Freedom(frame, np.concatenate(directions), axes, *kernels.rows_of_pairs(np.concatenate(pairs), k), shapes)
 
 
 def _pairs(slides: Slides, k: int) -> Numbers:
     """Return the pairs (p, 2) of a vertex that slides and a neighbour."""
     mine = np.zeros(k, dtype=bool)
     mine[slides.vertices] = True
-    both = np.concatenate([slides.edges, slides.edges[:, ::-1]])
-    return both[mine[both[:, 0]]]
-
-
-def _rows(pairs: list[Numbers], k: int) -> tuple[Numbers, Numbers]:
-    """Return compressed rows of pairs, each ascending."""
-    first, second = np.ascontiguousarray(np.concatenate(pairs).T)
-    ascending, _ = kernels.counted_order(second, k)
-    order, offsets = kernels.counted_order(first[ascending], k)
-    return offsets, second[ascending[order]]
+    return kernels.pairs_from(np.ascontiguousarray(slides.edges), mine)

@@ -19,7 +19,6 @@ from meshfix_cli.mesh.sides import (
     Kept,
     Surface,
     around,
-    edges_of_elements,
     facets_of,
     frames_of,
     normals_seen,
@@ -119,7 +118,7 @@ def inward(mesh: Mesh) -> Mask:
     connectivity, points = topology.connectivity, mesh.along_curve(mesh.points)
     if not connectivity.orientable:
         return found
-    part, (here, there) = connectivity.component, edges_of_elements(topology)
+    part, (here, there) = connectivity.component, topology.across()
     areas = kernels.area_vectors(points, *rows_of_elements(topology), 1)
     middles = topology.centroids(points - points[0], np.arange(topology.m))
     volumes = np.bincount(part, (areas * middles).sum(axis=1))
@@ -189,15 +188,27 @@ def feigned(mesh: Mesh, region: Mask) -> Mask:
 
     Others are on features that go on, or where such meet.
     """
-    surface, freedom, topology = mesh.surface, mesh.freedom, mesh.topology
-    assert surface is not None and surface.kept is not None and freedom is not None
-    ends = mesh.along_curve(topology.boundary)
-    along, k = (freedom.degrees == 1) & ~ends, len(region)
-    start, end = topology.edges()
+    if not meets_features(mesh, region):
+        return np.zeros(len(region), dtype=bool)
+    assert mesh.freedom is not None
+    degrees = mesh.freedom.degrees
+    along, k = (degrees == 1) & ~mesh.along_curve(mesh.topology.boundary), len(region)
+    start, end = mesh.topology.edges()
     beside = np.bincount(start, along[end], k) + np.bincount(end, along[start], k)
-    held = surface.kept.held | ends
-    lone = np.where(along, beside == 0, (freedom.degrees == 0) & (beside < 2))
-    return np.asarray(region & lone & ~held)
+    lone = np.where(along, beside == 0, (degrees == 0) & (beside < 2))
+    return np.asarray(region & lone & ~_ends(mesh))
+
+
+def meets_features(mesh: Mesh, region: Mask) -> bool:
+    """Whether a vertex (k,) of a region is on a feature, neither at the boundary nor held."""
+    assert mesh.freedom is not None
+    return bool((region & (mesh.freedom.degrees < 2) & ~_ends(mesh)).any())
+
+
+def _ends(mesh: Mesh) -> Mask:
+    """Mark the vertices (k,) that are at the boundary, or held."""
+    assert mesh.surface is not None and mesh.surface.kept is not None
+    return np.asarray(mesh.surface.kept.held | mesh.along_curve(mesh.topology.boundary))
 
 
 def on_edges(mesh: Mesh, region: Mask) -> Mask:

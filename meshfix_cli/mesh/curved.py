@@ -136,16 +136,25 @@ class Curved:
         That of each vertex of the connectivity; -1: it slides on none.
     pairs : (p, 2) int32
         Each of these and a neighbour on its surface or curve.
-    shapes : Shapes
+    directions : (s,) uint8
+        See `Shapes`.
+    shapes : Shapes or None
+        None: they are not asked for.
     """
 
     shape: Numbers
     pairs: Numbers
-    shapes: Shapes
+    directions: NDArray[np.uint8]
+    shapes: Shapes | None
 
 
 def curved_of(
-    points: Array, given: Constraints, smooth: Smooth, flat: NDArray[np.uint8], joints: Joints | None = None
+    points: Array,
+    given: Constraints,
+    smooth: Smooth,
+    flat: NDArray[np.uint8],
+    joints: Joints | None = None,
+    with_shapes: bool = True,
 ) -> Curved:
     """Find the vertices that slide on surfaces and curves.
 
@@ -160,10 +169,12 @@ def curved_of(
         an edge of a prism of many sides, go onto the surface.
     joints : Joints, optional
         Of facets in space; None: they lie in a plane.
+    with_shapes : bool
+        False: of a surface it is only told who slides on which.
     """
     if joints is None:
         return _Plane(points, given, smooth).found(flat)
-    return _Solid(points, given, smooth, joints).found(flat)
+    return _Solid(points, given, smooth, joints).found(flat, with_shapes)
 
 
 class _Shaped:
@@ -221,7 +232,7 @@ class _Plane(_Shaped):
         pieces = _Pieces(facets, tangents, number[chain])
         none = _Pieces(np.empty((0, 3), dtype=np.int32), tangents[:0], number[:0])
         edges = kernels.pairs_from(np.ascontiguousarray(facets), shape >= 0)
-        return _curved(shape, edges, none, pieces, [1] * curves, self)
+        return _curved(shape, edges, none, pieces, np.ones(curves, dtype=np.uint8), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,7 +263,7 @@ class _Solid(_Shaped):
         good = -(unit[:, 0] * unit[:, 1]).sum(axis=1) >= self.smooth.cosine
         return features, vertices[good], pairs[good]
 
-    def found(self, flat: NDArray[np.uint8]) -> Curved:
+    def found(self, flat: NDArray[np.uint8], with_shapes: bool = True) -> Curved:
         k, corners, owners = len(self.points), self.around.vertices, self.around.owners
         features, vertices, pairs = self.curves
         on_surface = (self.around.fans(k) == 1) & (flat < 2)
@@ -269,13 +280,15 @@ class _Solid(_Shaped):
         of_curve, curves = numbered(chain[pairs[there, 0]], len(features))
         of_curve = np.where(of_curve < 0, -1, of_curve + surfaces).astype(np.int32)
         shape[vertices[there]] = of_curve[chain[pairs[there, 0]]]
+        directions = np.array([2] * surfaces + [1] * curves, dtype=np.uint8)
+        if not with_shapes:
+            return Curved(shape, np.empty((0, 2), dtype=np.int32), directions, None)
         triangles = self._triangles(number)
         tangents = self.tangents(features, vertices, pairs)
         mine = of_curve[chain] >= 0
         segments = _Pieces(features[mine][:, [0, 1, 1]], tangents[mine][:, [0, 1, 1]], of_curve[chain[mine]])
         sliding = (self.joints.edges, on_surface), (np.ascontiguousarray(features), on_curve)
         edges = np.concatenate([kernels.pairs_from(*one) for one in sliding])
-        directions = [2] * surfaces + [1] * curves
         return _curved(shape, edges, triangles, segments, directions, self)
 
     def _triangles(self, number: Numbers) -> _Pieces:
@@ -297,7 +310,12 @@ def _joined(arrays: list[NDArray[Any]]) -> NDArray[Any]:
 
 
 def _curved(
-    shape: Numbers, edges: Numbers, triangles: _Pieces, segments: _Pieces, directions: list[int], found: _Shaped
+    shape: Numbers,
+    edges: Numbers,
+    triangles: _Pieces,
+    segments: _Pieces,
+    directions: NDArray[np.uint8],
+    found: _Shaped,
 ) -> Curved:
     """Put together what slides: of pieces and what is around their vertices, what is needed."""
     points, of_piece = found.points, np.concatenate([triangles.shape, segments.shape])
@@ -314,9 +332,9 @@ def _curved(
     place[order] = np.arange(len(order), dtype=np.int32)
     some, others = (np.ascontiguousarray(one.vertices) for one in (triangles, segments))
     around = kernels.around_pieces(some, others, of_piece, place, bounded)
-    corners, kinds = rows_of(points, vertices.ravel()).reshape(ways.shape), np.array(directions, dtype=np.uint8)
+    corners = rows_of(points, vertices.ravel()).reshape(ways.shape)
     shapes = Shapes(
-        vertices, corners, ways, first, kinds, *around, found.smooth.bound, found.folds,
+        vertices, corners, ways, first, directions, *around, found.smooth.bound, found.folds,
         found.given.normals is not None,
     )  # fmt: skip
-    return Curved(shape, edges, shapes)
+    return Curved(shape, edges, directions, shapes)

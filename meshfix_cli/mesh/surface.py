@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.freedom import Freedom, freedom_of
+from meshfix_cli.mesh.freedom import Freedom, flat_of, freedom_of
 from meshfix_cli.mesh.patches import Constraints, unit_vectors
 from meshfix_cli.mesh.sides import (
     Kept,
@@ -70,14 +70,15 @@ def laid_out(
     inverted[judged.check(points, threads)[0]] = True
     broken[judged.vertices(inverted)] = True
     given = Constraints(facets, kept.labels, kept.lines, inverted, broken, normals)
-    freedom = freedom_of(points, given, kept.smooth)
+    flat = flat_of(points, given)
+    freedom = freedom_of(points, given, kept.smooth, flat, with_shapes=region is None or reference is not None)
     if reference is not None and _is_elsewhere(freedom, now, ASTRAY * mesh.mean_edge_length(threads), threads):
         return laid_out(mesh, kept, None, threads, region)
     if region is not None:
         found = replace(mesh, freedom=freedom, surface=Surface(normals, kept))
         traces = np.asarray(np.append(feigned(found, region), False)[facets].any(axis=1))
-        smoothed = np.where(traces[:, None], _seen_around(mesh, threads)[1], normals)
-        freedom = freedom_of(points, replace(given, normals=smoothed), kept.smooth) if traces.any() else freedom
+        smoothed = np.where(traces[:, None], _seen_around(mesh, threads)[1], normals) if traces.any() else normals
+        freedom = freedom_of(points, replace(given, normals=smoothed), kept.smooth, flat)
     degrees = freedom.degrees
     moves = degrees == 2
     if kept.slide != "none":

@@ -48,8 +48,9 @@ class Body:
     @property
     def h(self) -> float:
         """The mean length of the distinct edges, in model units."""
-        ends = np.unique(np.sort(np.concatenate([self.cells[:, [k, k - 1]] for k in range(3)]), axis=1), axis=0)
-        return float(np.linalg.norm(self.points[ends[:, 0]] - self.points[ends[:, 1]], axis=1).mean())
+        low, high = np.sort(np.concatenate([self.cells[:, [k, k - 1]] for k in range(3)]), axis=1).T
+        start, end = np.divmod(np.unique(low * len(self.points) + high), len(self.points))
+        return float(np.linalg.norm(self.points[start] - self.points[end], axis=1).mean())
 
     @property
     def free(self) -> Cells:
@@ -135,12 +136,12 @@ def tangled(body: Body, percent: float, distance: float, seed: int = 0) -> Body:
         In the tangent plane, in mean edge lengths.
     seed : int
     """
-    random, points = np.random.default_rng(seed), body.points.copy()
+    random, points, h = np.random.default_rng(seed), body.points.copy(), body.h
     count = min(len(body.free), round(len(points) * percent / 100))
     left = np.sort(random.choice(body.free, count, replace=False))
     for _ in range(TRIES):
-        target = body.project(left, points[left] + distance * body.h * tangents(body, left, random))
-        good = body.inside(left, target, MARGIN * body.h)
+        target = body.project(left, points[left] + distance * h * tangents(body, left, random))
+        good = body.inside(left, target, MARGIN * h)
         points[left[good]] = target[good]
         left = left[~good]
     return body.at(points)
@@ -235,6 +236,22 @@ def bumps(count: int, height: float = 0.0833, waves: tuple[float, float] = (3.2,
 def halved(quads: Cells) -> Cells:
     """Return the triangles (2m, 3) of quadrilaterals (m, 4), halved along the diagonal from the first corner."""
     return np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]])
+
+
+def jittered(count: int, height: float, share: float = 0.2, seed: int = 0) -> Body:
+    """Return `bumps` whose inner vertices are moved by a share of the step of the grid at most, along each axis.
+
+    Its quadrilaterals are halved along either diagonal, at random; up to a quarter of the step no triangle is folded.
+    """
+    body, random = bumps(count, height), np.random.default_rng(seed)
+    points, rows = body.points.copy(), body.free
+    points[rows, :2] += share / (count - 1) * random.uniform(-1, 1, (len(rows), 2))
+    points[rows] = body.project(rows, points[rows])
+    first, second = np.split(body.cells, 2)
+    a, b, c, d = first[:, 0], first[:, 1], first[:, 2], second[:, 2]
+    turned = random.random(len(a)) < 0.5
+    quads = np.where(turned[:, None], np.column_stack([b, c, d, a]), np.column_stack([a, b, c, d]))
+    return replace(body, points=points, cells=halved(quads))
 
 
 def _smooth(points: Points, cells: Cells, surface: Surface) -> Body:

@@ -19,10 +19,14 @@ from meshfix_cli.kernels._surface import around_pieces as around_pieces
 from meshfix_cli.kernels._surface import check_unfolded as check_unfolded
 from meshfix_cli.kernels._surface import counted_order as counted_order
 from meshfix_cli.kernels._surface import dots_between as dots_between
+from meshfix_cli.kernels._surface import edge_lengths as edge_lengths
 from meshfix_cli.kernels._surface import fan_normals as fan_normals
 from meshfix_cli.kernels._surface import joints as joints
 from meshfix_cli.kernels._surface import off_reference as off_reference
+from meshfix_cli.kernels._surface import pairs_from as pairs_from
+from meshfix_cli.kernels._surface import refit as refit
 from meshfix_cli.kernels._surface import relocate_on_surface as relocate_on_surface
+from meshfix_cli.kernels._surface import rows_of_pairs as rows_of_pairs
 from meshfix_cli.kernels._surface import sines_between as sines_between
 from meshfix_cli.kernels._surface import summed as summed
 from meshfix_cli.kernels._surface import unfold as unfold

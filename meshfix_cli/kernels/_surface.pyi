@@ -9,12 +9,15 @@ Float64 = NDArray[np.float64]
 Int32 = NDArray[np.int32]
 
 class Reference:
-    """Surfaces and curves, see mesh/reference.hpp; copies of what it is given."""
+    """Surfaces and curves, see mesh/reference.hpp; they keep the arrays of corners and ways, which stay as they are."""
 
-    def __init__(self, corners: Float64, ways: Float64, first: Int32, directions: NDArray[np.uint8]) -> None:
+    def __init__(
+        self, corners: Float64, ways: Float64, first: Int32, directions: NDArray[np.uint8], in_order: bool = False
+    ) -> None:
         """Take the corners (p, d, d) of pieces, normals or tangents there, and of each shape the first and directions.
 
         `first` (s + 1,) ends with the number of pieces; `directions` (s,) is 2 for a surface and 1 for a curve.
+        `in_order`: the pieces of a shape that are near in memory are so in space.
         """
 
     def let_walk(self, vertices: Int32) -> None:
@@ -94,6 +97,24 @@ def around_pieces(
 
 def counted_order(numbers: Int32, most: int) -> tuple[Int32, Int32]:
     """The stable order of numbers from 0 to most - 1, and where each of these begins (most + 1,)."""
+
+def edge_lengths(points: Float64, mesh: Connectivity) -> Float64:
+    """The length (e,) of each edge of a connectivity, once, its vertices at points (k, d)."""
+
+def pairs_from(edges: Int32, marks: NDArray[np.bool_]) -> Int32:
+    """Of edges (e, 2) the pairs (p, 2) of a vertex that is marked (n,) and the other end."""
+
+def rows_of_pairs(pairs: Int32, n: int) -> tuple[Int32, Int32]:
+    """Compressed rows of pairs (p, 2) of numbers below n: offsets (n + 1,), and the second ones of each, ascending."""
+
+def refit(
+    points: Float64, rows: Int32, normals: Float64, sample: Float64, seen: Float64, smooth: float, threads: int
+) -> None:
+    """Move some points (k, 3), by their rows, along unit normals (k, 3) to the surface that a sample is of.
+
+    `sample` and `seen` (n, 3) are points, seven or more, and unit normals there. What the quadric through the nearest
+    leaves of them, relative to their distance, is less than `smooth`, else a point stays.
+    """
 
 def off_reference(freedom: Freedom, points: Float64, bound: float, threads: int) -> NDArray[np.uint8]:
     """Mark the vertices (k,) on the pieces of a reference that are farther from them than a bound."""

@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.patches import Constraints, Joints, normals_of, numbered, of_two, unit_vectors
-from meshfix_cli.mesh.topology import rows_of_part
+from meshfix_cli.mesh.topology import rows_of, rows_of_part
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -84,7 +85,7 @@ class Shapes:
     @cached_property
     def kernel(self) -> kernels.Reference:
         """The same for the kernels; parts that are sent to other processes are made anew."""
-        made = kernels.Reference(self.corners, self.ways, self.first, self.directions)
+        made = kernels.Reference(self.corners, self.ways, self.first, self.directions, self.walks)
         if self.walks:
             made.let_walk(self.vertices)
         return made
@@ -102,7 +103,7 @@ class Shapes:
 
         That is found at vertices, and at the middles of edges and triangles. With it the largest of `deviations`.
         """
-        moved = np.ascontiguousarray(points[self.vertices])
+        moved = rows_of(points, self.vertices.ravel()).reshape(self.corners.shape)
         deviation, back = self.kernel.farthest(moved, False, threads), self.kernel.at_corners(moved)
         others = (back.farthest(self.corners, of_corners, threads) for of_corners in (False, True))
         return max(deviation, *others, self.kernel.farthest(moved, True, threads)), deviation
@@ -135,16 +136,25 @@ class Curved:
         That of each vertex of the connectivity; -1: it slides on none.
     pairs : (p, 2) int32
         Each of these and a neighbour on its surface or curve.
-    shapes : Shapes
+    directions : (s,) uint8
+        See `Shapes`.
+    shapes : Shapes or None
+        None: they are not asked for.
     """
 
     shape: Numbers
     pairs: Numbers
-    shapes: Shapes
+    directions: NDArray[np.uint8]
+    shapes: Shapes | None
 
 
 def curved_of(
-    points: Array, given: Constraints, smooth: Smooth, flat: NDArray[np.uint8], joints: Joints | None = None
+    points: Array,
+    given: Constraints,
+    smooth: Smooth,
+    flat: NDArray[np.uint8],
+    joints: Joints | None = None,
+    with_shapes: bool = True,
 ) -> Curved:
     """Find the vertices that slide on surfaces and curves.
 
@@ -159,10 +169,12 @@ def curved_of(
         an edge of a prism of many sides, go onto the surface.
     joints : Joints, optional
         Of facets in space; None: they lie in a plane.
+    with_shapes : bool
+        False: of a surface it is only told who slides on which.
     """
     if joints is None:
         return _Plane(points, given, smooth).found(flat)
-    return _Solid(points, given, smooth, joints).found(flat)
+    return _Solid(points, given, smooth, joints).found(flat, with_shapes)
 
 
 class _Shaped:
@@ -219,7 +231,8 @@ class _Plane(_Shaped):
         tangents = self.tangents(facets, vertices, pairs)
         pieces = _Pieces(facets, tangents, number[chain])
         none = _Pieces(np.empty((0, 3), dtype=np.int32), tangents[:0], number[:0])
-        return _curved(shape, _both_ways(facets), none, pieces, [1] * curves, self)
+        edges = kernels.pairs_from(np.ascontiguousarray(facets), shape >= 0)
+        return _curved(shape, edges, none, pieces, np.ones(curves, dtype=np.uint8), self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,7 +263,7 @@ class _Solid(_Shaped):
         good = -(unit[:, 0] * unit[:, 1]).sum(axis=1) >= self.smooth.cosine
         return features, vertices[good], pairs[good]
 
-    def found(self, flat: NDArray[np.uint8]) -> Curved:
+    def found(self, flat: NDArray[np.uint8], with_shapes: bool = True) -> Curved:
         k, corners, owners = len(self.points), self.around.vertices, self.around.owners
         features, vertices, pairs = self.curves
         on_surface = (self.around.fans(k) == 1) & (flat < 2)
@@ -267,12 +280,15 @@ class _Solid(_Shaped):
         of_curve, curves = numbered(chain[pairs[there, 0]], len(features))
         of_curve = np.where(of_curve < 0, -1, of_curve + surfaces).astype(np.int32)
         shape[vertices[there]] = of_curve[chain[pairs[there, 0]]]
+        directions = np.array([2] * surfaces + [1] * curves, dtype=np.uint8)
+        if not with_shapes:
+            return Curved(shape, np.empty((0, 2), dtype=np.int32), directions, None)
         triangles = self._triangles(number)
         tangents = self.tangents(features, vertices, pairs)
-        segments = _Pieces(features[:, [0, 1, 1]], tangents[:, [0, 1, 1]], of_curve[chain])
-        both, every = _both_ways(features), _both_ways(self.joints.edges)
-        edges = np.concatenate([every[on_surface[every[:, 0]]], both[on_curve[both[:, 0]]]])
-        directions = [2] * surfaces + [1] * curves
+        mine = of_curve[chain] >= 0
+        segments = _Pieces(features[mine][:, [0, 1, 1]], tangents[mine][:, [0, 1, 1]], of_curve[chain[mine]])
+        sliding = (self.joints.edges, on_surface), (np.ascontiguousarray(features), on_curve)
+        edges = np.concatenate([kernels.pairs_from(*one) for one in sliding])
         return _curved(shape, edges, triangles, segments, directions, self)
 
     def _triangles(self, number: Numbers) -> _Pieces:
@@ -280,7 +296,7 @@ class _Solid(_Shaped):
         facets, fan = self.given.facets, self.around.fan
         of_fans = kernels.fan_normals(self.points, facets, self.units, fan)
         if facets.shape[1] == 3:
-            return _Pieces(facets, of_fans[fan].reshape(-1, 3, 3), number[self.patch])
+            return _Pieces(facets, rows_of(of_fans, fan).reshape(-1, 3, 3), number[self.patch])
         corner = np.full(facets.shape, -1, dtype=np.int32)
         corner[facets >= 0] = np.arange(len(fan), dtype=np.int32)
         rows, whole = np.arange(len(facets)), np.flatnonzero(facets[:, 3] >= 0)
@@ -289,23 +305,26 @@ class _Solid(_Shaped):
         return _Pieces(facets[row, place], of_fans[fan[corner[row, place]]], number[self.patch[row[:, 0]]])
 
 
-def _both_ways(edges: Numbers) -> Numbers:
-    return np.concatenate([edges, edges[:, ::-1]])
+def _joined(arrays: list[NDArray[Any]]) -> NDArray[Any]:
+    return np.ascontiguousarray(arrays[0] if len(arrays) == 1 else np.concatenate(arrays))
 
 
 def _curved(
-    shape: Numbers, edges: Numbers, triangles: _Pieces, segments: _Pieces, directions: list[int], found: _Shaped
+    shape: Numbers,
+    edges: Numbers,
+    triangles: _Pieces,
+    segments: _Pieces,
+    directions: NDArray[np.uint8],
+    found: _Shaped,
 ) -> Curved:
     """Put together what slides: of pieces and what is around their vertices, what is needed."""
     points, of_piece = found.points, np.concatenate([triangles.shape, segments.shape])
     order, first = kernels.counted_order(of_piece + np.int32(1), len(directions) + 1)
     order, first = order[first[1] :], first[1:] - first[1]  # but for those of none
-    if np.array_equal(order, np.arange(len(triangles.shape))):  # as of one surface
-        vertices, ways = np.ascontiguousarray(triangles.vertices), triangles.ways
-    else:
-        pieces = [triangles, segments] if len(triangles.shape) else [segments]
-        vertices = np.concatenate([one.vertices for one in pieces])[order]
-        ways = np.concatenate([one.ways for one in pieces])[order]
+    pieces = [one for one in (triangles, segments) if len(one.shape)] or [segments]
+    vertices, ways = (_joined(some) for some in ([one.vertices for one in pieces], [one.ways for one in pieces]))
+    if not np.array_equal(order, np.arange(len(of_piece))):  # as of one surface, and curves
+        vertices, ways = np.take(vertices, order, axis=0), np.take(ways, order, axis=0)
     bounded = shape >= 0
     if found.given.normals is not None:  # a surface: its flat parts go over into others
         bounded[vertices[np.logical_or.reduce([bounded[corner] for corner in vertices.T])]] = True
@@ -313,8 +332,9 @@ def _curved(
     place[order] = np.arange(len(order), dtype=np.int32)
     some, others = (np.ascontiguousarray(one.vertices) for one in (triangles, segments))
     around = kernels.around_pieces(some, others, of_piece, place, bounded)
+    corners = rows_of(points, vertices.ravel()).reshape(ways.shape)
     shapes = Shapes(
-        vertices, points[vertices], ways, first, np.array(directions, dtype=np.uint8), *around, found.smooth.bound,
-        found.folds, found.given.normals is not None,
+        vertices, corners, ways, first, directions, *around, found.smooth.bound, found.folds,
+        found.given.normals is not None,
     )  # fmt: skip
-    return Curved(shape, edges[shape[edges[:, 0]] >= 0], shapes)
+    return Curved(shape, edges, directions, shapes)

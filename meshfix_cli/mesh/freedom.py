@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
-from meshfix_cli.mesh.patches import Constraints, Joints, Slides, lines_of_plane, of_solid, tolerance_of
-from meshfix_cli.mesh.topology import Topology, rows_of_part
+from meshfix_cli.mesh.patches import Constraints, Joints, Slides, lengths, lines_of_plane, of_solid, tolerance_of
+from meshfix_cli.mesh.topology import Topology, rows_of, rows_of_part
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.curved import Shapes, Smooth
@@ -163,7 +163,31 @@ def constraints_of(
     return Constraints(facets, labels, np.empty((0, 2), dtype=np.int32), inverted[owners], broken)
 
 
-def freedom_of(points: Array, constraints: Constraints, smooth: Smooth | None = None) -> Freedom:
+@dataclass(frozen=True, eq=False)
+class Flat:
+    """Who may slide in lines and planes, and where facets in space meet: it does not depend on given normals."""
+
+    slides: list[Slides]
+    joints: Joints | None
+
+
+def flat_of(points: Array, constraints: Constraints) -> Flat:
+    """Find who may slide in lines and planes; see `freedom_of`."""
+    start, end = (rows_of(points, np.ascontiguousarray(constraints.facets[:, k])) for k in (0, 1))
+    tolerance = tolerance_of(points, float(lengths(start - end).mean()))
+    if points.shape[1] == 2:
+        return Flat([lines_of_plane(points, constraints, tolerance)], None)
+    joints = Joints(constraints.facets, constraints.lines, len(points))
+    return Flat(of_solid(points, constraints, tolerance, joints), joints)
+
+
+def freedom_of(
+    points: Array,
+    constraints: Constraints,
+    smooth: Smooth | None = None,
+    flat: Flat | None = None,
+    with_shapes: bool = True,
+) -> Freedom:
     """Find who may slide where, without a change of the shape.
 
     Parameters
@@ -173,48 +197,39 @@ def freedom_of(points: Array, constraints: Constraints, smooth: Smooth | None = 
     constraints : Constraints
     smooth : Smooth, optional
         Let those on curved surfaces and along curves slide as well.
+    flat : Flat, optional
+        What `flat_of` gives of the same; default: it is called.
+    with_shapes : bool
+        False: nobody will slide on curved surfaces and curves, or asks for neighbours; only who might is told.
     """
-    k, d = points.shape
-    ends = constraints.facets[:, :2]
-    length = float(np.linalg.norm(points[ends[:, 0]] - points[ends[:, 1]], axis=1).mean())
-    tolerance = tolerance_of(points, length)
-    joints = None if d == 2 else Joints(constraints.facets, constraints.lines, k)
-    if joints is None:
-        found = [lines_of_plane(points, constraints, tolerance)]
-    else:
-        found = of_solid(points, constraints, tolerance, joints)
+    k, flat = len(points), flat_of(points, constraints) if flat is None else flat
+    found = flat.slides
     frame, known = np.full(k, -1, dtype=np.int32), 0
     for slides in found:
         frame[slides.vertices] = known + slides.frame
         known += len(slides.axes)
-    pairs = [_pairs(slides, k) for slides in found]
     directions = [np.full(len(slides.axes), slides.directions, dtype=np.uint8) for slides in found]
     axes = np.ascontiguousarray(np.concatenate([slides.axes for slides in found]))
+    pairs = [_pairs(slides, k) for slides in found]
     if smooth is None:
-        return Freedom(frame, np.concatenate(directions), axes, *_rows(pairs, k))
+        return Freedom(frame, np.concatenate(directions), axes, *kernels.rows_of_pairs(np.concatenate(pairs), k))
     from meshfix_cli.mesh.curved import curved_of
 
     degrees = np.append(np.concatenate(directions), np.uint8(0))
-    curved = curved_of(points, constraints, smooth, degrees[frame], joints)
+    curved = curved_of(points, constraints, smooth, degrees[frame], flat.joints, with_shapes)
     mine = curved.shape >= 0
     frame[mine] = known + curved.shape[mine]
-    pairs = [*(some[~mine[some[:, 0]]] for some in pairs), curved.pairs]
-    directions.append(curved.shapes.directions)
-    shapes = curved.shapes if len(curved.shapes.directions) else None
-    return Freedom(frame, np.concatenate(directions), axes, *_rows(pairs, k), shapes)
+    if not with_shapes:
+        none = np.zeros(k + 1, dtype=np.int32), np.empty(0, dtype=np.int32)
+        return Freedom(frame, np.concatenate([*directions, curved.directions]), axes, *none)
+    pairs = [*(some[~mine[some[:, 0]]] for some in pairs if len(some)), curved.pairs]
+    directions.append(curved.directions)
+    shapes = curved.shapes if len(curved.directions) else None
+    return Freedom(frame, np.concatenate(directions), axes, *kernels.rows_of_pairs(np.concatenate(pairs), k), shapes)
 
 
 def _pairs(slides: Slides, k: int) -> Numbers:
     """Return the pairs (p, 2) of a vertex that slides and a neighbour."""
     mine = np.zeros(k, dtype=bool)
     mine[slides.vertices] = True
-    both = np.concatenate([slides.edges, slides.edges[:, ::-1]])
-    return both[mine[both[:, 0]]]
-
-
-def _rows(pairs: list[Numbers], k: int) -> tuple[Numbers, Numbers]:
-    """Return compressed rows of pairs, each ascending."""
-    first, second = np.ascontiguousarray(np.concatenate(pairs).T)
-    ascending, _ = kernels.counted_order(second, k)
-    order, offsets = kernels.counted_order(first[ascending], k)
-    return offsets, second[ascending[order]]
+    return kernels.pairs_from(np.ascontiguousarray(slides.edges), mine)

@@ -82,6 +82,11 @@ class Judged:
             inverted = np.flatnonzero(self.judge(points, threads)[0]).astype(np.int32)
         return inverted, smallest
 
+    def apart(self, points: Array, threads: int) -> tuple[Array, kernels.Connectivity]:
+        """Return where those of a surface are one by one in the plane, and the connectivity of the nodes there."""
+        assert self._unfolded is not None
+        return self._unfolded.points(points, threads), self._unfolded.connectivity
+
     def judge(self, points: Array, threads: int) -> tuple[NDArray[np.uint8], Array, Array]:
         """Return for each element VALID, or where it is not, INSIDE or CORNER; its signed measure; and its quality.
 

@@ -249,8 +249,10 @@ class Mesh:
 
     def mean_edge_length(self, threads: int = 1) -> float:
         """Return h of the paper's section 4: the mean length of the distinct edges, in model units."""
-        self.topology.stars(threads)
-        points, (start, end) = self.along_curve(self.points), self.topology.edges()
+        points, stars = self.along_curve(self.points), self.topology.stars(threads)
+        if self.topology.simplicial:
+            return float(kernels.edge_lengths(points, stars).mean())
+        start, end = self.topology.edges()
         return float(np.linalg.norm(points[end] - points[start], axis=1).mean())
 
     def boundary_edge_length(self) -> float:

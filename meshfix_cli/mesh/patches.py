@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.topology import distinct
+from meshfix_cli.mesh.topology import distinct, rows_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -99,8 +99,7 @@ def lines_of_plane(points: Array, given: Constraints, tolerance: float) -> Slide
     vertices, pairs = vertices[smooth], pairs[smooth]
     both = np.repeat(vertices, 2)
     good = surface.unfolded(both, pairs.ravel(), both, patch)[vertices]
-    ways = points[given.facets[:, 1]] - points[given.facets[:, 0]]
-    line = _lines(points, ways, given.facets, patch, patch[pairs[good, 0]], tolerance)
+    line = _lines(points, given.facets, patch, patch[pairs[good, 0]], tolerance)
     return Slides(vertices[good][line.kept], line.frame, line.axes, 1, given.facets)
 
 
@@ -142,8 +141,7 @@ def _along_edges(surface: _Surface, around: Around, patch: Numbers, creases: Num
     good = _flat_sides(surface, around, patch, vertices)
     vertices, pairs = vertices[good], pairs[good]
     chain = kernels.joined(np.ascontiguousarray(pairs), len(creases))
-    ways = points[creases[:, 1]] - points[creases[:, 0]]
-    line = _lines(points, ways, creases, chain, chain[pairs[:, 0]], tolerance)
+    line = _lines(points, creases, chain, chain[pairs[:, 0]], tolerance)
     return Slides(vertices[line.kept], line.frame, line.axes, 1, creases)
 
 
@@ -169,7 +167,8 @@ class _Surface:
     def __init__(self, points: Array, given: Constraints, tolerance: float) -> None:
         self.points, self.given, self.tolerance = points, given, tolerance
         self.normals, self.bent = normals_of(points, given.facets, tolerance)
-        self.areas = np.linalg.norm(self.normals, axis=1)
+        self.areas = lengths(self.normals)
+        self._last: tuple[Numbers, Mask] | None = None
 
     def patches(self, pairs: Numbers) -> tuple[Mask, Numbers]:
         """Return which pairs (p, 2) of facets that meet are of one patch, and a number (f,) for the patch of each.
@@ -197,15 +196,32 @@ class _Surface:
         """Return |sum of normals| / sum of areas of groups (count,) of facets; 1 where there is no area."""
         sums = kernels.summed(group, self.normals, count, facets)
         total = np.bincount(group, self.areas[facets], count)
-        return np.divide(np.linalg.norm(sums, axis=1), total, out=np.ones(count), where=total > 0)
+        return np.divide(lengths(sums), total, out=np.ones(count), where=total > 0)
 
     def _tangled(self, patch: Numbers) -> Mask:
         """(f,) bool, by the number of a patch: facets are turned over in it, and only such of inverted elements."""
-        count = len(patch)
-        sums = kernels.summed(patch, self.normals, count)
-        over = (self.normals * sums[patch]).sum(axis=1) < 0
-        by_itself = np.bincount(patch, over & ~self.given.inverted, count) > 0
-        return ~by_itself & (np.linalg.norm(sums, axis=1) > SLIT * np.bincount(patch, self.areas, count))
+        if self._last is None or self._last[0] is not patch:
+            count = len(patch)
+            sums = kernels.summed(patch, self.normals, count)
+            over = dots(self.normals, rows_of(sums, patch)) < 0
+            by_itself = np.zeros(count, dtype=bool)
+            by_itself[patch[over & ~self.given.inverted]] = True
+            tangled = ~by_itself & (lengths(sums) > SLIT * np.bincount(patch, self.areas, count))
+            self._last = patch, tangled
+        return self._last[1]
+
+
+def dots(one: Array, other: Array) -> Array:
+    """Return the products (k,) of vectors (k, d), column by column: along rows it takes five times as long."""
+    product = one[:, 0] * other[:, 0]
+    for k in range(1, one.shape[1]):
+        product += one[:, k] * other[:, k]
+    return np.asarray(product)
+
+
+def lengths(vectors: Array) -> Array:
+    """Return those (k,) of vectors (k, d)."""
+    return np.sqrt(dots(vectors, vectors))
 
 
 def normals_of(points: Array, facets: Numbers, tolerance: float) -> tuple[Array, Mask]:
@@ -308,13 +324,14 @@ class _Frames:
     axes: Array
 
 
-def _lines(points: Array, ways: Array, ends: Numbers, group: Numbers, wanted: Numbers, tolerance: float) -> _Frames:
-    """Return the lines in which the groups (v,) wanted lie, of edges that are ways (x, d) between ends (x, 2)."""
+def _lines(points: Array, ends: Numbers, group: Numbers, wanted: Numbers, tolerance: float) -> _Frames:
+    """Return the lines in which the groups (v,) wanted lie, of edges between ends (x, 2)."""
     number, mine = numbered(wanted, len(group))
     rows = np.flatnonzero(number[group] >= 0)
     place = number[group[rows]]
-    spread, axes = _common_direction(ways[rows], place, mine)
-    axes[:, 0][_constant(points, ends[rows], place, mine)] = 0.0
+    ends = ends[rows]
+    spread, axes = _common_direction(points[ends[:, 1]] - points[ends[:, 0]], place, mine)
+    axes[:, 0][_constant(points, ends, place, mine)] = 0.0
     axes[:, 0] /= np.maximum(np.linalg.norm(axes[:, 0], axis=1, keepdims=True), np.finfo(float).tiny)
     return _kept(spread <= tolerance, axes, number[wanted])
 

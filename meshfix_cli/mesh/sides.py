@@ -74,7 +74,7 @@ def normals_seen(topology: Topology, points: Array, threads: int) -> Array:
     depend on where their inner vertices are.
     """
     areas = kernels.area_vectors(points, *rows_of_elements(topology), threads)
-    own, pairs = unit_vectors(areas), joined_elements(topology)
+    own, pairs = unit_vectors(areas), topology.joined
     turned = kernels.dots_between(own, pairs) < 0
     flat = _are_zero(own)
     if not (turned.any() or flat.any()):
@@ -121,21 +121,6 @@ def rows_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:
     return mesh.node_offsets, mesh.nodes
 
 
-def edges_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:
-    """Return the element (f,) of each edge, by its row in the connectivity, and that across it; -1: there is none."""
-    mesh = topology.connectivity
-    if mesh.simplicial:
-        return np.repeat(np.arange(topology.m, dtype=np.int32), 3), mesh.mates.ravel() // 3
-    return mesh.facet_owners, np.where(mesh.facet_mates < 0, -1, mesh.facet_owners[mesh.facet_mates])
-
-
-def joined_elements(topology: Topology) -> Numbers:
-    """Return the pairs (p, 2) of elements, by their rows in the connectivity, that have an edge in common."""
-    here, there = edges_of_elements(topology)
-    once = there > here
-    return np.stack([here[once], there[once]], axis=1)
-
-
 def facets_of(topology: Topology) -> Numbers:
     """Return the elements (m, 3 or 4) as facets in space; -1: no more vertices."""
     mesh = topology.connectivity
@@ -149,7 +134,7 @@ def facets_of(topology: Topology) -> Numbers:
 
 def is_closed(topology: Topology) -> bool:
     """Whether a surface encloses something: each edge is of two elements, and these are numbered alike."""
-    return bool((edges_of_elements(topology)[1] >= 0).all()) and topology.connectivity.orientable
+    return bool((topology.across()[1] >= 0).all()) and topology.connectivity.orientable
 
 
 def frames_of(normals: Array) -> Array:

@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.freedom import Freedom, freedom_of
+from meshfix_cli.mesh.freedom import Freedom, flat_of, freedom_of
 from meshfix_cli.mesh.patches import Constraints, unit_vectors
 from meshfix_cli.mesh.sides import (
     Kept,
     Surface,
     around,
-    edges_of_elements,
     facets_of,
     frames_of,
     normals_seen,
@@ -71,14 +70,15 @@ def laid_out(
     inverted[judged.check(points, threads)[0]] = True
     broken[judged.vertices(inverted)] = True
     given = Constraints(facets, kept.labels, kept.lines, inverted, broken, normals)
-    freedom = freedom_of(points, given, kept.smooth)
+    flat = flat_of(points, given)
+    freedom = freedom_of(points, given, kept.smooth, flat, with_shapes=region is None or reference is not None)
     if reference is not None and _is_elsewhere(freedom, now, ASTRAY * mesh.mean_edge_length(threads), threads):
         return laid_out(mesh, kept, None, threads, region)
     if region is not None:
         found = replace(mesh, freedom=freedom, surface=Surface(normals, kept))
         traces = np.asarray(np.append(feigned(found, region), False)[facets].any(axis=1))
-        smoothed = np.where(traces[:, None], _seen_around(mesh, threads)[1], normals)
-        freedom = freedom_of(points, replace(given, normals=smoothed), kept.smooth) if traces.any() else freedom
+        smoothed = np.where(traces[:, None], _seen_around(mesh, threads)[1], normals) if traces.any() else normals
+        freedom = freedom_of(points, replace(given, normals=smoothed), kept.smooth, flat)
     degrees = freedom.degrees
     moves = degrees == 2
     if kept.slide != "none":
@@ -119,7 +119,7 @@ def inward(mesh: Mesh) -> Mask:
     connectivity, points = topology.connectivity, mesh.along_curve(mesh.points)
     if not connectivity.orientable:
         return found
-    part, (here, there) = connectivity.component, edges_of_elements(topology)
+    part, (here, there) = connectivity.component, topology.across()
     areas = kernels.area_vectors(points, *rows_of_elements(topology), 1)
     middles = topology.centroids(points - points[0], np.arange(topology.m))
     volumes = np.bincount(part, (areas * middles).sum(axis=1))
@@ -189,15 +189,27 @@ def feigned(mesh: Mesh, region: Mask) -> Mask:
 
     Others are on features that go on, or where such meet.
     """
-    surface, freedom, topology = mesh.surface, mesh.freedom, mesh.topology
-    assert surface is not None and surface.kept is not None and freedom is not None
-    ends = mesh.along_curve(topology.boundary)
-    along, k = (freedom.degrees == 1) & ~ends, len(region)
-    start, end = topology.edges()
+    if not meets_features(mesh, region):
+        return np.zeros(len(region), dtype=bool)
+    assert mesh.freedom is not None
+    degrees = mesh.freedom.degrees
+    along, k = (degrees == 1) & ~mesh.along_curve(mesh.topology.boundary), len(region)
+    start, end = mesh.topology.edges()
     beside = np.bincount(start, along[end], k) + np.bincount(end, along[start], k)
-    held = surface.kept.held | ends
-    lone = np.where(along, beside == 0, (freedom.degrees == 0) & (beside < 2))
-    return np.asarray(region & lone & ~held)
+    lone = np.where(along, beside == 0, (degrees == 0) & (beside < 2))
+    return np.asarray(region & lone & ~_ends(mesh))
+
+
+def meets_features(mesh: Mesh, region: Mask) -> bool:
+    """Whether a vertex (k,) of a region is on a feature, neither at the boundary nor held."""
+    assert mesh.freedom is not None
+    return bool((region & (mesh.freedom.degrees < 2) & ~_ends(mesh)).any())
+
+
+def _ends(mesh: Mesh) -> Mask:
+    """Mark the vertices (k,) that are at the boundary, or held."""
+    assert mesh.surface is not None and mesh.surface.kept is not None
+    return np.asarray(mesh.surface.kept.held | mesh.along_curve(mesh.topology.boundary))
 
 
 def on_edges(mesh: Mesh, region: Mask) -> Mask:

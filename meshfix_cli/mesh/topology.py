@@ -168,6 +168,22 @@ class Topology:
         off = self.used & ~self.boundary
         return np.asarray(off[self.simplices].any(axis=1))
 
+    def across(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+        """Return the element (f,) of each facet, by its row in the connectivity, and that across; -1: there is none."""
+        mesh, corners = self.connectivity, self.dimension + 1
+        if mesh.simplicial:
+            return np.repeat(np.arange(self.m, dtype=np.int32), corners), mesh.mates.ravel() // corners
+        return mesh.facet_owners, np.where(mesh.facet_mates < 0, -1, mesh.facet_owners[mesh.facet_mates])
+
+    @cached_property
+    def joined(self) -> NDArray[np.int32]:
+        """(p, 2) int32: the elements, by their rows in the connectivity, that have a facet in common."""
+        here, there = self.across()
+        once = np.flatnonzero(there > here)
+        pairs = np.empty((len(once), 2), dtype=np.int32)
+        pairs[:, 0], pairs[:, 1] = here[once], there[once]
+        return read_only(pairs)
+
     @cached_property
     def mirrored(self) -> NDArray[np.bool_]:
         """(m,) bool: simplices of components whose numbering has, for most, the other orientation.

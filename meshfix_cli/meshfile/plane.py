@@ -11,6 +11,7 @@ from meshfix_cli.errors import ReadError
 
 # Distance from the plane, relative to the size of the mesh, that text with seven digits or float32 may leave.
 FLAT = 1e-6
+SOME, BENT = 300, 0.01  # points of a mesh that in the mean are so far from any plane: there is none for all of them
 FAR = 1e3  # median distances from the middle, beyond which a vertex was thrown away rather than meshed
 
 
@@ -31,6 +32,8 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     ReadError
         The points lie on one line.
     """
+    if _is_bent(points[:: max(1, len(points) // SOME)], epsilon):
+        return None
     points, epsilon = _drawn_near(points, epsilon)
     size = float(np.ptp(points, axis=0).max())
     flat = FLAT + 4 * epsilon * float(np.abs(points).max()) / size
@@ -46,6 +49,17 @@ def plane_basis(points: NDArray[np.float64], epsilon: float = 0.0) -> NDArray[np
     if np.ptp(centred @ axes[:, 1]) <= flat:
         raise ReadError("all vertices lie on one line")
     return np.stack([axes[:, 2], np.cross(normal_vector, axes[:, 2])])
+
+
+def _is_bent(points: NDArray[np.float64], epsilon: float) -> bool:
+    """Whether some of the points of a mesh leave no doubt that all of them lie in no plane."""
+    points, epsilon = _drawn_near(points, epsilon)
+    size = float(np.ptp(points, axis=0).max())
+    if not size > 0.0 or len(points) < SOME:
+        return False
+    centred = (points - points.mean(axis=0)) / size
+    doubt = BENT + epsilon * float(np.abs(points).max()) / size / FLAT * BENT
+    return bool(np.linalg.eigvalsh(centred.T @ centred)[0] > doubt**2 * len(points))
 
 
 def is_level(basis: NDArray[np.float64]) -> bool:

@@ -14,7 +14,7 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.judged import INSIDE, VALID
 from meshfix_cli.mesh.mesh import Mesh
-from meshfix_cli.mesh.topology import Block, Topology
+from meshfix_cli.mesh.topology import Block, Topology, rows_of
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
 from meshfix_cli.quality.relative import worst_and_mean_to
 
@@ -146,8 +146,11 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
         return _summarise_surface(mesh, metrics, threads)
     curved = None if mesh.quadratic is None else mesh.judge_curved(threads)
     judgement = None if curved is None else curved[2]
-    simplicial = mesh.topology.simplicial
-    summary = _summarise_simplices(mesh, threads) if simplicial else _summarise_elements(mesh, threads, judgement)
+    if mesh.topology.simplicial:
+        connectivity = mesh.topology.connectivity
+        summary = _summarise_simplices(mesh.along_curve(mesh.points), connectivity, connectivity.rows, threads)
+    else:
+        summary = _summarise_elements(mesh, threads, judgement)
     summary = replace(
         summary,
         metrics={name: worst_and_mean(name, mesh, threads, judgement) for name in metrics},
@@ -156,11 +159,13 @@ def summarise(mesh: Mesh, metrics: Sequence[str] = (), threads: int = 1, referen
     return summary if curved is None else _with_curved(summary, *curved)
 
 
-def _summarise_simplices(mesh: Mesh, threads: int) -> Summary:
-    """Evaluate a mesh of simplices of one type."""
-    connectivity, bins = mesh.topology.connectivity, BINS[mesh.dimension]
+def _summarise_simplices(
+    points: Array, connectivity: kernels.Connectivity, rows: NDArray[np.int32], threads: int
+) -> Summary:
+    """Evaluate simplices of one type, which have rows (m,), with the points (k, d) of a connectivity."""
+    bins = BINS[points.shape[1]]
     smallest, histogram, total, inverted, folded, min_measure, largest = kernels.summarise(
-        mesh.along_curve(mesh.points), connectivity, bins, math.radians(BIN_WIDTH), threads
+        points, connectivity, bins, math.radians(BIN_WIDTH), threads
     )
     return Summary(
         elements=len(smallest),
@@ -173,18 +178,20 @@ def _summarise_simplices(mesh: Mesh, threads: int) -> Summary:
         percentile_1=math.degrees(_percentile(smallest, 1, histogram)),
         histogram=tuple(histogram.tolist()),
         metrics={},
-        inverted_elements=np.sort(connectivity.rows[inverted]),
+        inverted_elements=np.sort(rows[inverted]),
     )
 
 
 def _summarise_surface(mesh: Mesh, metrics: Sequence[str], threads: int) -> Summary:
     """Evaluate a surface: its elements one by one in their planes, and the edges at which one is turned over."""
-    from meshfix_cli.mesh.sides import joined_elements
-
-    summary = summarise(mesh.unfolded(threads), metrics, threads)
+    if mesh.topology.simplicial and not metrics:
+        apart = mesh.judged().apart(mesh.along_curve(mesh.points), threads)
+        summary = _summarise_simplices(*apart, mesh.topology.connectivity.rows, threads)
+    else:
+        summary = summarise(mesh.unfolded(threads), metrics, threads)
     wrong = np.zeros(mesh.topology.m, dtype=bool)
     wrong[summary.inverted_elements] = True
-    one, other = wrong[mesh.topology.connectivity.rows[joined_elements(mesh.topology)]].T
+    one, other = wrong[mesh.topology.connectivity.rows[mesh.topology.joined]].T
     return replace(summary, folded=int((one != other).sum()))
 
 
@@ -403,16 +410,19 @@ def _sizes(points: NDArray[np.float64], facets: NDArray[np.int32]) -> tuple[floa
     if points.shape[1] == 2:
         a, b = points[facets[:, 0]], points[facets[:, 1]]
         return abs(float((a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum())) / 2, float(np.linalg.norm(b - a, axis=1).sum())
+    from meshfix_cli.mesh.patches import dots, lengths
+
     volume = area = 0.0
-    whole = (facets >= 0).all(axis=1)
-    triangles = [(facets[~whole] if facets.shape[1] == 4 else facets, (0, 1, 2), 1.0)]
+    triangles = [(facets, 1.0)]
     if facets.shape[1] == 4:
-        triangles += [(facets[whole], cut, 0.5) for cut in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
-    for rows, cut, share in triangles:
-        a, b, c = (points[rows[:, k]] for k in cut)
-        normal = np.cross(b - a, c - a)
-        volume += share * float((normal * a).sum()) / 6
-        area += share * float(np.linalg.norm(normal, axis=1).sum()) / 2
+        whole = (facets >= 0).all(axis=1)
+        triangles = [(facets[~whole, :3], 1.0)]
+        triangles += [(facets[whole][:, cut], 0.5) for cut in ((0, 1, 2), (0, 2, 3), (0, 1, 3), (1, 2, 3))]
+    for rows, share in triangles:
+        offsets = np.arange(0, rows.size + 1, 3, dtype=np.int32)
+        areas = kernels.area_vectors(points, offsets, np.ascontiguousarray(rows).ravel(), 1)
+        volume += share * float(dots(areas, rows_of(points, np.ascontiguousarray(rows[:, 0]))).sum()) / 3
+        area += share * float(lengths(areas).sum())
     return abs(volume), area
 
 

@@ -14,6 +14,7 @@ from meshfix_cli.mesh.surface import (
     feigned,
     in_planes,
     laid_out,
+    meets_features,
     normals_of_vertices,
     on_edges,
     seen,
@@ -76,8 +77,10 @@ def surface_steps(
             yield from (found := _Last(smooth(_only(in_planes(best, region, edges, threads), odd))))
             best = _laid_on_sample(found.mesh, best, mesh, region, threads)
         yield from (found := _Last(smooth(best)))
+        if inverted or not meets_features(best, region):
+            return
         best = laid_out(seen(found.mesh, threads), surface.kept, threads=threads, region=region)
-        if inverted or not feigned(best, region).any():
+        if not feigned(best, region).any():
             return
 
 
@@ -113,5 +116,6 @@ def _laid_on_sample(moved: Mesh, before: Mesh, first: Mesh, region: Mask, thread
     assert first.surface is not None and first.surface.kept is not None
     there, here, sample = (one.along_curve(one.points) for one in (moved, before, first))
     rows = np.flatnonzero((there != here).any(axis=1))
-    there = refitted(there, rows, normals_of_vertices(moved, threads), sample, normals_of_vertices(first, threads))
+    normals, seen_at_first = (normals_of_vertices(one, threads) for one in (moved, first))
+    there = refitted(there, rows, normals, sample, seen_at_first, threads)
     return laid_out(seen(moved.with_vertices(there), threads), first.surface.kept, threads=threads, region=region)

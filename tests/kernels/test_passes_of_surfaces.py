@@ -137,10 +137,12 @@ def test_triangles_are_checked_as_where_they_are_unfolded(count: int) -> None:
     signed = np.where((areas * normals).sum(axis=1) < 0, -size, size)
     a, b = flat.reshape(-1, 3, 2)[:, 1], flat.reshape(-1, 3, 2)[:, 2]
     assert (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2 == pytest.approx(signed, rel=1e-9)
+    alone = kernels.check_unfolded(points, offsets, nodes.ravel(), normals, 1)
     for threads in (1, 2):
         inverted, smallest = kernels.check_unfolded(points, offsets, nodes.ravel(), normals, threads)
         apart = np.arange(3 * count, dtype=np.int32).reshape(-1, 3)
         expected = kernels.check(flat, apart, 1)
         assert np.array_equal(inverted, expected[0])
-        assert smallest == expected[1]
+        assert smallest == pytest.approx(expected[1], rel=1e-9)
+        assert smallest == alone[1]
         assert np.array_equal(inverted, np.flatnonzero(signed < 0))

@@ -51,6 +51,14 @@ constexpr int NEWTON_TRIALS = 5;       // steps, each half as long as the one be
 // Steps of smoothing, each half as long as the one before, that are tried where an element would not be valid inside.
 constexpr int GUARD_TRIALS = 4;
 
+// Weights of the corners of a piece from which on a foot is on it: beside one at a corner or side, rounding must not choose.
+constexpr double ON_PIECE = -1e-10;
+
+// The quadric through points that sample a surface: what is added to its normal equations, and from how many points on it
+// tells more than these.
+constexpr double QUADRIC_RIDGE = 1e-9;
+constexpr int QUADRIC_LEAST = 7;
+
 // Of the square of how far facets are from their shapes: what draws a vertex back makes it as much smaller.
 constexpr double DRAWN_BACK = 0.9;
 

@@ -318,15 +318,16 @@ void init_freedom(Freedom* self, const Vector<const std::int32_t>& frame, const 
 
 void keep_near(Freedom& self, const Vector<const std::int32_t>& offsets, const Matrix<const std::int32_t>& around,
                double bound) {
-    self.around_offsets = copied(offsets);
-    self.around = {around.data(), around.data() + around.size()};
+    if (offsets.shape(0) != self.frame.size() + 1) throw nb::value_error("the offsets are of another mesh");
+    self.around_offsets = offsets.data();
+    self.around = around.data();
     self.bound2 = bound * bound;
 }
 
 void init_reference(Reference* self, const Matrices<const double>& corners, const Matrices<const double>& ways,
-                    const Vector<const std::int32_t>& first, const Vector<const std::uint8_t>& directions) {
-    new (self) Reference(static_cast<int>(corners.shape(2)), copied(corners), copied(ways), copied(first),
-                         copied(directions));
+                    const Vector<const std::int32_t>& first, const Vector<const std::uint8_t>& directions, bool in_order) {
+    new (self) Reference(static_cast<int>(corners.shape(2)), corners.data(), ways.data(), copied(first),
+                         copied(directions), in_order);
 }
 
 void let_walk(Reference& self, const Matrix<const std::int32_t>& vertices) {
@@ -408,12 +409,13 @@ void bind_mesh(nb::module_& m) {
     nb::class_<Freedom>(m, "Freedom")
         .def("__init__", &init_freedom, "frame"_a.noconvert(), "directions"_a.noconvert(), "axes"_a.noconvert(),
              "offsets"_a.noconvert(), "neighbours"_a.noconvert(), "reference"_a = nb::none(), nb::keep_alive<1, 7>())
-        .def("keep_near", &keep_near, "offsets"_a.noconvert(), "around"_a.noconvert(), "bound"_a);
+        .def("keep_near", &keep_near, "offsets"_a.noconvert(), "around"_a.noconvert(), "bound"_a, nb::keep_alive<1, 2>(),
+             nb::keep_alive<1, 3>());
     nb::class_<Reference>(m, "Reference")
         .def("__init__", &init_reference, "corners"_a.noconvert(), "ways"_a.noconvert(), "first"_a.noconvert(),
-             "directions"_a.noconvert())
+             "directions"_a.noconvert(), "in_order"_a = false, nb::keep_alive<1, 2>(), nb::keep_alive<1, 3>())
         .def("let_walk", &let_walk, "vertices"_a.noconvert())
-        .def("at_corners", &at_corners, "corners"_a.noconvert())
+        .def("at_corners", &at_corners, "corners"_a.noconvert(), nb::keep_alive<0, 1>(), nb::keep_alive<0, 2>())
         .def("nearest", [](const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
                            int threads) { return nearest_py(self, points, shapes, threads, nullptr); },
              "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a)

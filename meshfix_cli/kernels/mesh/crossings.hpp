@@ -64,7 +64,7 @@ class Crossings {
 
     // Pairs of facets that cross. Those whose boxes only touch along an axis do not: a plane is between them.
     std::vector<std::int32_t> find(int threads) const {
-        return find<D>(threads, [&](std::int32_t a, std::int32_t b) { return cross(corners_of(a), corners_of(b)); });
+        return find<D>(threads, [&](std::int32_t a, std::int32_t b) { return shared_by(a, b) < D - 1 && cross(corners_of(a), corners_of(b)); });
     }
 
     // Pairs of facets (a, b) for which `holds(a, b)` and whose boxes meet, along at least AXES axes beyond touching.
@@ -340,13 +340,19 @@ class Crossings {
         return corners;
     }
 
-    static bool cross(const Facet& a, const Facet& b) {
+    // How many vertices two facets have in common; those that have an edge, or in the plane a vertex, do not cross.
+    int shared_by(std::int32_t a, std::int32_t b) const {
+        const std::int32_t *one = facets_ + static_cast<std::int64_t>(a) * D, *other = facets_ + static_cast<std::int64_t>(b) * D;
         int shared = 0;
-        for (int k = 0; k < D; ++k) shared += b.has(a.vertices[k]);
+        for (int k = 0; k < D; ++k)
+            for (int l = 0; l < D; ++l) shared += one[k] == other[l];
+        return shared;
+    }
+
+    static bool cross(const Facet& a, const Facet& b) {
         if constexpr (D == 2) {
-            return shared == 0 && cross_each_other(a.at[0], a.at[1], b.at[0], b.at[1]);
+            return cross_each_other(a.at[0], a.at[1], b.at[0], b.at[1]);
         } else {
-            if (shared > 1) return false;
             const Sides first = sides(a, b);
             return !first.one && (any_edge_pierces(a, first, b) || any_edge_pierces(b, sides(b, a), a));
         }

@@ -26,14 +26,14 @@ struct Freedom {
     std::vector<double> axes;
     std::vector<std::int32_t> offsets, neighbours;
     const Reference* reference = nullptr;
-    std::vector<std::int32_t> around_offsets{}, around{};
+    const std::int32_t *around_offsets = nullptr, *around = nullptr;  // somebody else's; null: none
     double bound2 = 0.0;
 
     bool anywhere(std::int64_t v) const { return frame[v] < 0; }
 
     // The piece of the reference that v itself had there.
     std::int64_t piece(std::int64_t v) const {
-        if (around.empty() || around_offsets[v] == around_offsets[v + 1]) return Reference::ANY;
+        if (around == nullptr || around_offsets[v] == around_offsets[v + 1]) return Reference::ANY;
         return around[4 * static_cast<std::size_t>(around_offsets[v + 1]) - 1];
     }
 

@@ -5,16 +5,18 @@
 //                           in space has two, and the last again
 // first (s+1)               where the pieces of each shape begin
 // directions (s)            2: a surface, 1: a curve
+// in_order                  the pieces of a shape that are near in memory are so in space: trees halve their rows as they are
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numeric>
-#include <tuple>
+#include <utility>
 #include <vector>
 
-#include "mesh/counting.hpp"
+#include "common/tolerances.hpp"
+#include "mesh/beside.hpp"
 #include "mesh/simplex.hpp"
 
 namespace meshfix {
@@ -32,15 +34,13 @@ class Reference {
    public:
     static constexpr std::int64_t ANY = -1;  // piece
 
-    Reference(int dimension, std::vector<double> corners, std::vector<double> ways, const std::vector<std::int32_t>& first,
-              std::vector<std::uint8_t> directions)
-        : dimension_(dimension), corners_(std::move(corners)), ways_(std::move(ways)), directions_(std::move(directions)),
-          first_(first) {
+    // The corners and ways are somebody else's, who keeps them.
+    Reference(int dimension, const double* corners, const double* ways, const std::vector<std::int32_t>& first,
+              std::vector<std::uint8_t> directions, bool in_order = false)
+        : dimension_(dimension), corners_(corners), ways_(ways), directions_(std::move(directions)), first_(first) {
         order_.resize(first.back());
         std::iota(order_.begin(), order_.end(), 0);
-        centres_.resize(order_.size() * dimension_);
-        for (std::size_t i = 0; i < corners_.size(); ++i)
-            centres_[i / (dimension_ * dimension_) * dimension_ + i % dimension_] += corners_[i];
+        if (!in_order) find_centres();
         find_boxes();
         for (std::size_t s = 0; s + 1 < first.size(); ++s) {
             roots_.push_back(static_cast<std::int32_t>(nodes_.size()));
@@ -56,7 +56,7 @@ class Reference {
     // The same shapes with their corners elsewhere: the boxes of its trees are other ones.
     Reference at_corners(const double* corners) const {
         Reference moved(*this);
-        std::copy(corners, corners + corners_.size(), moved.corners_.begin());
+        moved.corners_ = corners;
         moved.find_boxes();
         if (!beside_.empty()) moved.find_slopes();
         for (std::size_t i = nodes_.size(); i-- > 0;) {
@@ -75,39 +75,14 @@ class Reference {
 
     // Lets searches go from piece to piece, where they begin at one. vertices (p, 3): numbers that tell which corners are one.
     void let_walk(const std::int32_t* vertices) {
-        struct Side {
-            std::int32_t low, high, place;  // place: 3 * piece + side
-        };
-        std::vector<Side> sides;
-        std::vector<std::int32_t> shape_of;
-        std::int32_t most = -1;
-        for (std::size_t shape = 0; shape < shapes(); ++shape)
-            for (std::int32_t piece = first_[shape]; directions_[shape] == 2 && piece < first_[shape + 1]; ++piece)
-                for (int i = 0; i < 3; ++i) {
-                    const std::int32_t a = vertices[piece * 3 + i], b = vertices[piece * 3 + (i + 1) % 3];
-                    sides.push_back({std::min(a, b), std::max(a, b), piece * 3 + i});
-                    shape_of.push_back(static_cast<std::int32_t>(shape));
-                    most = std::max(most, sides.back().low);
-                }
-        std::vector<std::int32_t> offsets;
-        const auto count = static_cast<std::int64_t>(sides.size());
-        std::vector<std::int32_t> order = counted_order(count, most + 1, offsets, [&](std::int64_t i) { return sides[i].low; });
-        for (std::int32_t v = 0; v <= most; ++v)
-            std::sort(order.begin() + offsets[v], order.begin() + offsets[v + 1], [&](std::int32_t a, std::int32_t b) {
-                return std::tie(shape_of[a], sides[a].high, a) < std::tie(shape_of[b], sides[b].high, b);
-            });
-        beside_.assign(static_cast<std::size_t>(first_.back()) * 3, -1);
-        for (std::int64_t i = 0; i + 1 < count; ++i) {
-            const Side &one = sides[order[i]], &other = sides[order[i + 1]];
-            if (shape_of[order[i]] != shape_of[order[i + 1]] || one.low != other.low || one.high != other.high) continue;
-            beside_[one.place] = other.place / 3;
-            beside_[other.place] = one.place / 3;
-        }
+        Beside found(vertices, first_, directions_);
+        beside_ = std::move(found.pieces);
+        is_again_ = std::move(found.is_again);
         find_slopes();
     }
 
     int dimension() const { return dimension_; }
-    std::size_t size() const { return corners_.size(); }
+    std::size_t size() const { return order_.size() * dimension_ * dimension_; }  // numbers of the corners
     std::size_t shapes() const { return roots_.size(); }
     int directions(std::int32_t shape) const { return directions_[shape]; }
 
@@ -118,7 +93,7 @@ class Reference {
     Foot<D> foot(std::int32_t shape, const Vec<D>& p, std::int64_t near = ANY, bool nearest = false) const {
         Foot<D> best = any_foot<D>(shape);
         if (near != ANY) {
-            const bool inside = walk<D>(shape, static_cast<std::int32_t>(near), p, best, -1.0);
+            const bool inside = walk_from<D>(shape, near, p, best);
             if (inside && !nearest && best.distance2 <= size2<D>(best.piece)) return best;
         }
         search<D>(shape, p, best, 0.0);
@@ -129,8 +104,18 @@ class Reference {
     template <int D>
     bool is_within(double bound2, std::int32_t shape, const Vec<D>& p, std::int64_t near) const {
         Foot<D> best = any_foot<D>(shape);
-        if (near != ANY) walk<D>(shape, static_cast<std::int32_t>(near), p, best, bound2);
-        if (best.distance2 <= bound2) return true;
+        if (near != ANY) {
+            auto piece = static_cast<std::int32_t>(near);
+            if constexpr (D == 3) {
+                std::array<double, 3> weights;
+                if (walk(shape, piece, p, weights)) {
+                    const double off = dot(p - slopes_[piece].origin, slopes_[piece].normal);
+                    if (off * off <= bound2) return true;
+                }
+            }
+            look<D>(shape, piece, p, best);
+            if (best.distance2 <= bound2) return true;
+        }
         best.distance2 = std::nextafter(bound2, INFINITY);
         search<D>(shape, p, best, bound2);
         return best.distance2 <= bound2;
@@ -140,7 +125,7 @@ class Reference {
     template <int D>
     double distance2_beyond(double least2, std::int32_t shape, const Vec<D>& p, std::int64_t near) const {
         Foot<D> best = any_foot<D>(shape);
-        walk<D>(shape, static_cast<std::int32_t>(near), p, best, least2);
+        walk_from<D>(shape, near, p, best);
         search<D>(shape, p, best, least2);
         return best.distance2;
     }
@@ -151,6 +136,7 @@ class Reference {
     double farthest2(const double* corners, bool of_corners, std::int64_t begin, std::int64_t end, double most2) const {
         std::int32_t shape = 0;
         const auto look = [&](std::int64_t piece, const Vec<D>& p) {
+            if (is_within<D>(most2, shape, p, piece)) return;
             const double here2 = distance2_beyond<D>(most2, shape, p, piece);
             if (here2 > most2) most2 = here2;
         };
@@ -160,7 +146,8 @@ class Reference {
             std::array<Vec<D>, D> at;
             for (int i = 0; i < D; ++i) at[i] = load<D>(corners + (piece * D + i) * D);
             if (of_corners) {
-                for (int i = 0; i < count; ++i) look(piece, at[i]);
+                for (int i = 0; i < count; ++i)
+                    if (count == 2 || is_again_.empty() || !is_again_[piece * 3 + i]) look(piece, at[i]);
                 continue;
             }
             for (int i = 0; i < (count == 2 ? 1 : D); ++i) {
@@ -283,18 +270,24 @@ class Reference {
     // Those of the pieces, while trees are built.
     void find_boxes() {
         boxes_.assign(order_.size(), Box());
-        const std::size_t of_piece = static_cast<std::size_t>(dimension_) * dimension_;
-        for (std::size_t i = 0; i < corners_.size(); ++i) {
-            Box& box = boxes_[i / of_piece];
-            const std::size_t k = i % dimension_;
-            box.low[k] = std::min(box.low[k], corners_[i]);
-            box.high[k] = std::max(box.high[k], corners_[i]);
-        }
+        const double* corner = corners_;
+        for (Box& box : boxes_)
+            for (int i = 0; i < dimension_; ++i, corner += dimension_)
+                for (int k = 0; k < dimension_; ++k) {
+                    box.low[k] = std::min(box.low[k], corner[k]);
+                    box.high[k] = std::max(box.high[k], corner[k]);
+                }
+    }
+
+    void find_centres() {
+        centres_.resize(order_.size() * dimension_);
+        for (std::size_t i = 0; i < size(); ++i)
+            centres_[i / (dimension_ * dimension_) * dimension_ + i % dimension_] += corners_[i];
     }
 
     template <int D>
-    Vec<D> at(const std::vector<double>& values, std::int64_t piece, int corner) const {
-        return load<D>(values.data() + (piece * D + corner) * D);
+    Vec<D> at(const double* values, std::int64_t piece, int corner) const {
+        return load<D>(values + (piece * D + corner) * D);
     }
 
     // For what is nearer than the best so far, until that is near enough.
@@ -317,36 +310,10 @@ class Reference {
         }
     }
 
-    // From piece to piece across the side that is between it and a position, until that is over one, or near enough. Whether
-    // it is over one.
-    template <int D>
-    bool walk(std::int32_t shape, std::int32_t piece, const Vec<D>& p, Foot<D>& best, double enough2) const {
-        if constexpr (D == 3) {
-            for (int step = 0; !beside_.empty() && directions_[shape] == 2 && step < STEPS; ++step) {
-                const Vec<3> off = p - at<3>(corners_, piece, 0);
-                const double second = dot(off, slopes_[piece].second), third = dot(off, slopes_[piece].third);
-                const std::array<double, 3> weights{1.0 - second - third, second, third};
-                if (!(second == second)) break;
-                const int least = static_cast<int>(std::min_element(weights.begin(), weights.end()) - weights.begin());
-                if (weights[least] >= 0.0) {
-                    take<3>(piece, weights, p, best);
-                    return true;
-                }
-                for (int i = 0; i < 3; ++i)
-                    if (weights[(i + 2) % 3] < 0.0) look_along<3>(piece, i, (i + 1) % 3, p, best);
-                if (best.distance2 <= enough2) return false;
-                piece = beside_[piece * 3 + (least + 1) % 3];
-                if (piece < 0) return false;
-            }
-            if (!beside_.empty()) return false;
-        }
-        look<D>(shape, piece, p, best);
-        return false;
-    }
-
-    // How the weights of the second and third corner of a triangle grow in its plane; NaN: it has no area.
+    // How the weights of the second and third corner of a triangle grow in its plane, from its first one, and its unit normal;
+    // NaN: it has no area.
     struct Slopes {
-        Vec<3> second, third;
+        Vec<3> origin, second, third, normal;
     };
 
     void find_slopes() {
@@ -355,8 +322,44 @@ class Reference {
             const Vec<3> a = at<3>(corners_, piece, 0), b = at<3>(corners_, piece, 1) - a, c = at<3>(corners_, piece, 2) - a;
             const Vec<3> normal = cross(b, c);
             const double area2 = norm2(normal), scale = area2 > 0.0 ? 1.0 / area2 : NAN;
-            slopes_[piece] = {scale * cross(c, normal), scale * cross(normal, b)};
+            slopes_[piece] = {a, scale * cross(c, normal), scale * cross(normal, b), std::sqrt(scale) * normal};
         }
+    }
+
+    // From piece to piece across the side that is between it and a position; the last one, and the weights of its corners
+    // there. Whether it is over that.
+    bool walk(std::int32_t shape, std::int32_t& piece, const Vec<3>& p, std::array<double, 3>& weights) const {
+        if (beside_.empty() || directions_[shape] != 2) return false;
+        for (int step = 0; step < STEPS; ++step) {
+            const Slopes& here = slopes_[piece];
+            const Vec<3> off = p - here.origin;
+            const double second = dot(off, here.second), third = dot(off, here.third), first = 1.0 - second - third;
+            if (first >= ON_PIECE && second >= ON_PIECE && third >= ON_PIECE) {
+                weights = {first, second, third};
+                return true;
+            }
+            if (!(second == second)) return false;
+            const int side = first < std::min(second, third) ? 1 : second <= third ? 2 : 0;  // opposite the least
+            const std::int32_t next = beside_[piece * 3 + side];
+            if (next < 0) return false;
+            piece = next;
+        }
+        return false;
+    }
+
+    // The foot that is found from a piece on, in that where a walk ends; whether that is over it.
+    template <int D>
+    bool walk_from(std::int32_t shape, std::int64_t near, const Vec<D>& p, Foot<D>& best) const {
+        auto piece = static_cast<std::int32_t>(near);
+        if constexpr (D == 3) {
+            std::array<double, 3> weights;
+            if (walk(shape, piece, p, weights)) {
+                take<3>(piece, weights, p, best);
+                return true;
+            }
+        }
+        look<D>(shape, piece, p, best);
+        return false;
     }
 
     // The weights of the corners of a triangle at the nearest point of its plane; false: it has no area.
@@ -396,24 +399,36 @@ class Reference {
     template <int D>
     std::int32_t build(std::int32_t begin, std::int32_t end) {
         const auto number = static_cast<std::int32_t>(nodes_.size());
-        Node node{Box(), begin, end, 0};
-        for (std::int32_t i = begin; i < end; ++i) node.box.include(boxes_[order_[i]]);
-        nodes_.push_back(node);
-        if (end - begin <= LEAF) return number;
+        const bool is_leaf = end - begin <= LEAF, in_order = centres_.empty();
+        nodes_.push_back({Box(), begin, end, 0});
+        if (is_leaf || !in_order)
+            for (std::int32_t i = begin; i < end; ++i) nodes_[number].box.include(boxes_[order_[i]]);
+        if (is_leaf) return number;
+        const std::int32_t middle = begin + (end - begin) / 2;
+        if (!in_order) divide<D>(nodes_[number].box, begin, middle, end);
+        build<D>(begin, middle);
+        const std::int32_t right = build<D>(middle, end);
+        Node& node = nodes_[number];
+        node.right = right;
+        if (in_order) {
+            node.box.include(nodes_[number + 1].box);
+            node.box.include(nodes_[right].box);
+        }
+        return number;
+    }
+
+    // Brings those to the front whose centres are lower along the longest side of their box.
+    template <int D>
+    void divide(const Box& box, std::int32_t begin, std::int32_t middle, std::int32_t end) {
         int axis = 0;
         for (int k = 1; k < D; ++k)
-            if (node.box.high[k] - node.box.low[k] > node.box.high[axis] - node.box.low[axis]) axis = k;
+            if (box.high[k] - box.low[k] > box.high[axis] - box.low[axis]) axis = k;
         const auto centre = [&](std::int32_t piece) { return centres_[static_cast<std::size_t>(piece) * D + axis]; };
-        const std::int32_t middle = begin + (end - begin) / 2;
         std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
                          [&](std::int32_t a, std::int32_t b) {
                              const double x = centre(a), y = centre(b);
                              return x < y || (x == y && a < b);
                          });
-        build<D>(begin, middle);
-        const std::int32_t right = build<D>(middle, end);
-        nodes_[number].right = right;
-        return number;
     }
 
     template <int D>
@@ -454,9 +469,11 @@ class Reference {
     }
 
     int dimension_;
-    std::vector<double> corners_, ways_, centres_{};  // centres_: sums of corners, while trees are built
+    const double *corners_, *ways_;
+    std::vector<double> centres_{};  // sums of corners, while trees are built, or none
     std::vector<std::uint8_t> directions_;
     std::vector<std::int32_t> first_, beside_{};  // beside_ (p, 3): the pieces at the sides, -1: none; or empty
+    std::vector<bool> is_again_{};  // (p, 3): a corner that another piece of the shape has had before; or empty
     std::vector<std::int32_t> order_, roots_;
     std::vector<Node> nodes_{};
     std::vector<Box> boxes_{};

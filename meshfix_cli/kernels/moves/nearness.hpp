@@ -21,8 +21,8 @@ class Nearness {
 
     // Whether there are facets around a vertex that must stay near a shape.
     bool is_bounded(std::int64_t v) const {
-        const auto& offsets = parameters_.freedom->around_offsets;
-        return !offsets.empty() && offsets[v] != offsets[v + 1];
+        const std::int32_t* offsets = parameters_.freedom->around_offsets;
+        return offsets != nullptr && offsets[v] != offsets[v + 1];
     }
 
     bool is_in_reach(std::int64_t v, const Vec<D>& x) const {
@@ -63,7 +63,7 @@ class Nearness {
     bool for_each_middle(std::int64_t v, const Vec<D>& x, const F& look) const {
         const Freedom& freedom = *parameters_.freedom;
         for (std::int32_t i = freedom.around_offsets[v]; i < freedom.around_offsets[v + 1]; ++i) {
-            const std::int32_t* row = freedom.around.data() + 4 * static_cast<std::int64_t>(i);
+            const std::int32_t* row = freedom.around + 4 * static_cast<std::int64_t>(i);
             const Vec<D> a = load<D>(points_ + static_cast<std::int64_t>(row[0]) * D);
             if (!look(0.5 * (x + a), row[2], row[3])) return false;
             if (row[1] < 0) continue;

@@ -5,6 +5,7 @@
 
 #include "mesh/python.hpp"
 #include "surface/joints.hpp"
+#include "surface/refit.hpp"
 #include "surface/relocate.hpp"
 
 namespace meshfix {
@@ -135,6 +136,48 @@ auto counted_order_py(const Int32s& numbers, std::int64_t most) {
     return std::make_pair(to_numpy(std::move(order)), to_numpy(std::move(offsets)));
 }
 
+auto rows_of_pairs_py(const Matrix<const std::int32_t>& pairs, std::int64_t n) {
+    PairRows rows = unlocked([&] { return PairRows(pairs.data(), static_cast<std::int64_t>(pairs.shape(0)), n); });
+    return std::make_pair(to_numpy(std::move(rows.offsets)), to_numpy(std::move(rows.second)));
+}
+
+auto pairs_from_py(const Matrix<const std::int32_t>& edges, const Vector<const bool>& marks) {
+    return to_numpy(unlocked([&] {
+        return pairs_from(edges.data(), static_cast<std::int64_t>(edges.shape(0)), reinterpret_cast<const std::uint8_t*>(marks.data()));
+    }), 2);
+}
+
+// Those between a vertex and its neighbours of higher numbers.
+auto edge_lengths_py(const Matrix<const double>& points, const PyConnectivity& self) {
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    if (static_cast<std::int64_t>(points.shape(0)) != self.mesh.n()) throw nb::value_error("the points are of another mesh");
+    const StarsView stars = stars_of(self.mesh);
+    return to_numpy(with_dimension(points.shape(1), [&](auto dimension) {
+        constexpr int D = dimension;
+        std::vector<double> lengths;
+        lengths.reserve(static_cast<std::size_t>(stars.neighbour_offsets[self.mesh.n()]) / 2);
+        for (std::int32_t v = 0; v < self.mesh.n(); ++v)
+            for (std::int32_t i = stars.neighbour_offsets[v]; i < stars.neighbour_offsets[v + 1]; ++i)
+                if (const std::int64_t other = stars.neighbours[i]; v < other)
+                    lengths.push_back(std::sqrt(norm2(load<D>(points.data() + other * D) - load<D>(points.data() + std::int64_t{v} * D))));
+        return lengths;
+    }));
+}
+
+void refit_py(const Matrix<double>& points, const Int32s& rows, const Matrix<const double>& normals, const Matrix<const double>& sample,
+              const Matrix<const double>& seen, double smooth, int threads) {
+    for (const auto& some : {points.shape(1), normals.shape(1), sample.shape(1), seen.shape(1)})
+        if (some != 3) throw nb::value_error("these are no points in space");
+    check_vectors(points.shape(0), normals.shape(0));
+    check_vectors(sample.shape(0), seen.shape(0));
+    if (sample.shape(0) == 0) throw nb::value_error("there is no sample");
+    unlocked([&] {
+        refit(points.data(), rows.data(), static_cast<std::int64_t>(rows.shape(0)), normals.data(), sample.data(), seen.data(),
+              static_cast<std::int64_t>(sample.shape(0)), smooth, threads);
+        return 0;
+    });
+}
+
 // Marks the vertices on the reference that are farther from it than a bound.
 auto off_reference_py(const Freedom& self, const Matrix<const double>& points, double bound, int threads) {
     if (points.shape(0) != self.frame.size()) throw nb::value_error("the points are of another mesh");
@@ -174,6 +217,11 @@ void bind_surface(nb::module_& m) {
     m.def("around_pieces", &around_pieces_py, "triangles"_a.noconvert(), "segments"_a.noconvert(), "shape"_a.noconvert(),
           "place"_a.noconvert(), "bounded"_a.noconvert());
     m.def("counted_order", &counted_order_py, "numbers"_a.noconvert(), "most"_a);
+    m.def("rows_of_pairs", &rows_of_pairs_py, "pairs"_a.noconvert(), "n"_a);
+    m.def("pairs_from", &pairs_from_py, "edges"_a.noconvert(), "marks"_a.noconvert());
+    m.def("edge_lengths", &edge_lengths_py, "points"_a.noconvert(), "mesh"_a);
+    m.def("refit", &refit_py, "points"_a.noconvert(), "rows"_a.noconvert(), "normals"_a.noconvert(), "sample"_a.noconvert(),
+          "seen"_a.noconvert(), "smooth"_a, "threads"_a);
     m.def("off_reference", &off_reference_py, "freedom"_a, "points"_a.noconvert(), "bound"_a, "threads"_a);
 }
 

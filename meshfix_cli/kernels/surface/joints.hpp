@@ -29,20 +29,23 @@ struct Joints {
     std::vector<std::uint8_t> is_line{};
 
     Joints(const FacetsView& facets, const std::int32_t* lines, std::int64_t line_count, std::int64_t vertices) {
-        std::vector<std::int32_t> pairs;  // of sides, then of lines
+        std::size_t sides = 0;
+        for (std::int64_t f = 0; f < facets.count; ++f) sides += facets.corners(f);
+        std::vector<std::int32_t> pairs(2 * sides);  // of sides, then of lines
+        ends.resize(2 * sides);
+        owners.resize(sides);
         std::int32_t corner = 0;
         for (std::int64_t f = 0; f < facets.count; ++f) {
             const int corners = facets.corners(f);
             for (int i = 0; i < corners; ++i) {
-                const int after = (i + 1) % corners;
-                std::int32_t a = facets[f][i], b = facets[f][after], at_a = corner + i, at_b = corner + after;
-                if (a > b) {
-                    std::swap(a, b);
-                    std::swap(at_a, at_b);
-                }
-                pairs.insert(pairs.end(), {a, b});
-                ends.insert(ends.end(), {at_a, at_b});
-                owners.push_back(static_cast<std::int32_t>(f));
+                const int after = i + 1 < corners ? i + 1 : 0;
+                const bool turned = facets[f][i] > facets[f][after];
+                const std::size_t side = static_cast<std::size_t>(corner) + i;
+                pairs[2 * side + turned] = facets[f][i];
+                pairs[2 * side + !turned] = facets[f][after];
+                ends[2 * side + turned] = corner + i;
+                ends[2 * side + !turned] = corner + after;
+                owners[side] = static_cast<std::int32_t>(f);
             }
             corner += corners;
         }
@@ -58,9 +61,13 @@ struct Joints {
                                                       [&](std::int64_t i) { return pairs[2 * i]; });
         const auto sides = static_cast<std::int32_t>(owners.size());
         order.reserve(owners.size());
+        edges.reserve(pairs.size());
+        count.reserve(pairs.size() / 2);
+        is_line.reserve(pairs.size() / 2);
         for (std::int64_t v = 0; v < vertices; ++v) {
-            std::stable_sort(all.begin() + offsets[v], all.begin() + offsets[v + 1],
-                             [&](std::int32_t a, std::int32_t b) { return pairs[2 * a + 1] < pairs[2 * b + 1]; });
+            std::sort(all.begin() + offsets[v], all.begin() + offsets[v + 1], [&](std::int32_t a, std::int32_t b) {
+                return pairs[2 * a + 1] != pairs[2 * b + 1] ? pairs[2 * a + 1] < pairs[2 * b + 1] : a < b;
+            });
             for (std::int32_t i = offsets[v]; i < offsets[v + 1]; ++i) {
                 const std::int32_t one = all[i], other = pairs[2 * one + 1];
                 if (i == offsets[v] || other != edges.back()) {
@@ -87,10 +94,11 @@ inline std::vector<double> fan_normals(const double* points, const FacetsView& f
     std::int64_t corner = 0;
     for (std::int64_t f = 0; f < facets.count; ++f) {
         const int count = facets.corners(f);
+        std::array<Vec<3>, 4> at, way;  // and to the corner behind
+        for (int i = 0; i < count; ++i) at[i] = load<3>(points + static_cast<std::int64_t>(facets[f][i]) * 3);
+        for (int i = 0; i < count; ++i) way[i] = unit(at[(i + 1) % count] - at[i]);
         for (int i = 0; i < count; ++i) {
-            const Vec<3> here = load<3>(points + static_cast<std::int64_t>(facets[f][i]) * 3);
-            const auto way = [&](int to) { return unit(load<3>(points + static_cast<std::int64_t>(facets[f][to]) * 3) - here); };
-            const double cosine = dot(way((i + 1) % count), way((i + count - 1) % count));
+            const double cosine = -dot(way[i], way[(i + count - 1) % count]);
             const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
             double* sum = sums.data() + static_cast<std::int64_t>(fan[corner++]) * 3;
             for (int k = 0; k < 3; ++k) sum[k] += angle * normals[f * 3 + k];

@@ -6,6 +6,7 @@
 
 #include "moves/nearness.hpp"
 #include "moves/relocate.hpp"
+#include "surface/faces.hpp"
 #include "surface/unfold.hpp"
 
 namespace meshfix {
@@ -23,21 +24,23 @@ struct SurfaceRelocation {
     Directions<3> directions{};
     Plane plane{{}, {}};
     Vec<3> base{};  // the origin of the star
-    struct Face {
-        Vec<3> from, to, normal;
-    };
-    std::vector<Face> faces{};  // of the star, in space
+    SpaceFaces faces{};  // of the star
+    Vec<3> up{};         // the sum of their normals
     std::vector<std::uint16_t> beside{};
 
     void gather(std::int64_t v) {
         const Vec<3> here = at(v);
         directions.set(*parameters.freedom, v, load<3>(parameters.start + v * 3), here);
         star.faces_count = stars.offsets[v + 1] - stars.offsets[v];
-        faces.clear();
+        faces.resize(star.faces_count);
+        up = {};
         const std::int32_t* neighbours = stars.neighbours + stars.neighbour_offsets[v];
         const std::uint16_t* face = stars.faces + static_cast<std::int64_t>(stars.offsets[v]) * 2;
-        for (int i = 0; i < star.faces_count; ++i)
-            faces.push_back({at(neighbours[face[2 * i]]), at(neighbours[face[2 * i + 1]]), normal_of(stars.corners[stars.offsets[v] + i])});
+        for (int i = 0; i < star.faces_count; ++i) {
+            const Vec<3> normal = normal_of(stars.corners[stars.offsets[v] + i]);
+            faces.set(i, {at(neighbours[face[2 * i]]), at(neighbours[face[2 * i + 1]]), normal});
+            up = up + normal;
+        }
         star.origin = {};
         star.centre = {};
         if (directions.count == 2)
@@ -57,8 +60,6 @@ struct SurfaceRelocation {
     void lay_flat(std::int64_t v, const Vec<3>& here, const std::uint16_t* face) {
         base = centroid<3>(stars, points, v);
         plane = Plane(directions.axes[0], directions.axes[1]);
-        Vec<3> up{};
-        for (const Face& one : faces) up = up + one.normal;
         if (dot(cross(plane.along, plane.across), up) < 0.0) plane.across = -1.0 * plane.across;
         star.directions.set_anywhere();
         star.faces = face;
@@ -84,7 +85,8 @@ struct SurfaceRelocation {
         star.neighbours.clear();
         beside.clear();
         double size2 = 0.0;
-        for (const Face& one : faces) {
+        for (int i = 0; i < faces.count(); ++i) {
+            const Face one = faces[i];
             Vec<3> side = cross(one.normal, way);
             const double length = std::sqrt(norm2(side));
             if (length > 0.0) side = (1.0 / length) * side;
@@ -108,39 +110,9 @@ struct SurfaceRelocation {
     Vec<3> landing(const Vec<2>& x) const { return directions.onto(base + star.unit * plane.position(x)); }
     Vec<2> local(const Vec<3>& p) const { return (1.0 / star.unit) * plane.coordinates(p - base); }
 
-    // The edges from p to a face, in the plane of the three.
-    Edges<2> unfolded(const Face& face, const Vec<3>& p) const {
-        const Vec<3> a = face.from - p, b = face.to - p, area = cross(a, b);
-        const double length = std::sqrt(norm2(a)), height = std::sqrt(norm2(area));
-        if (!(length > 0.0)) return {};
-        return {Vec<2>{length, 0.0}, Vec<2>{dot(a, b) / length, (dot(area, face.normal) < 0.0 ? -height : height) / length}};
-    }
-
-    double smallest_area(const Vec<3>& p) const {
-        double smallest = INFINITY;
-        for (const Face& face : faces) smallest = std::min(smallest, determinant(unfolded(face, p)));
-        return smallest;
-    }
-
+    double smallest_area(const Vec<3>& p) const { return faces.smallest_area(p); }
+    double quality(const Vec<3>& p) const { return faces.quality(p, star.roles); }
     bool valid(const Vec<3>& p) const { return quality(p) > 0.0; }
-
-    // The square of the smallest sine around p, or of the scaled Jacobian; -1 where an element is not valid.
-    double quality(const Vec<3>& p) const {
-        double smallest = INFINITY;
-        for (int i = 0; i < star.faces_count; ++i) {
-            const Edges<2> e = unfolded(faces[i], p);
-            if (!is_valid<2>(e, determinant(e), [&] { return Corners<2>{Vec<2>{}, e[0], e[1]}; })) return -1.0;
-            smallest = std::min(smallest, sine2_of(i, e));
-        }
-        return smallest;
-    }
-
-    double sine2_of(int i, const Edges<2>& e) const {
-        if (star.roles.empty()) return min_sine2(e, false);
-        const Roles<2>& roles = star.roles[i / LANES];
-        const double corner = roles.corner[i % LANES];
-        return corner > 0.5 ? corner_sine2<2>(e, corner, roles.weight[i % LANES], false) : min_sine2(e, false);
-    }
 
     bool is_near(std::int64_t v, const Vec<3>& p) const {
         const Nearness<3> nearness(points, parameters);

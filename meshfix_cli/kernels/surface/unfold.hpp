@@ -2,7 +2,6 @@
 // is known of plane elements holds for it. One that is turned over has a negative area there.
 #pragma once
 
-#include <numeric>
 #include <vector>
 
 #include "common/parallel.hpp"
@@ -111,25 +110,44 @@ inline std::vector<double> unfold(const double* points, const ElementsView& elem
     return flat;
 }
 
-// What `check` finds of triangles that are unfolded, a few at a time.
+// What `check` finds of triangles that are unfolded: only those that a quick look in space does not tell to be valid are.
 inline Validity check_unfolded(const double* points, const ElementsView& triangles, const double* normals, int threads) {
-    constexpr std::int64_t FEW = 1024;
-    std::array<std::int32_t, 3 * FEW> numbers;
-    std::iota(numbers.begin(), numbers.end(), 0);
     std::vector<Validity> parts(triangles.count / PER_ITEM + 1);
     for_each_range(triangles.count, PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-        std::vector<double> flat(6 * FEW);
-        for (std::int64_t first = begin; first < end; first += FEW) {
-            const std::int64_t count = std::min(FEW, end - first);
-            unfold_range(points, triangles, normals, first, first + count, flat.data());
-            Validity part;
-            for (std::int64_t s = 0; s < count; s += LANES) {
-                const Edges<2, Pack> e = lanes_of<2>(flat.data(), numbers.data(), s, count);
-                look_at<2>(part, flat.data(), numbers.data(), s, count, e, determinant(e));
+        Validity part;
+        Pack least = constant<Pack>(INFINITY);  // the square of twice the smallest area, with its sign
+        for (std::int64_t t = begin; t < end; t += LANES) {
+            std::array<std::int64_t, LANES> rows;
+            for (int i = 0; i < LANES; ++i) rows[i] = std::min(t + i, end - 1);
+            const auto corner = [&](int k) {
+                std::array<const double*, LANES> from;
+                for (int i = 0; i < LANES; ++i) from[i] = points + static_cast<std::int64_t>(triangles.nodes[3 * rows[i] + k]) * 3;
+                Vec<3, Pack> p;
+                for (int x = 0; x < 3; ++x) p[x] = gathered([&](int i) { return from[i][x]; });
+                return p;
+            };
+            const Vec<3, Pack> first = corner(0), a = corner(1) - first, b = corner(2) - first, area = cross(a, b);
+            Vec<3, Pack> normal;
+            for (int x = 0; x < 3; ++x) normal[x] = gathered([&](int i) { return normals[3 * rows[i] + x]; });
+            const Pack area2 = norm2(area), zero = constant<Pack>(0.0);
+            const Pack signed2 = select(dot(area, normal) < zero, -area2, area2);
+            const Pack longest2 = constant<Pack>(4.0 * VALID) * larger(norm2(a), norm2(b));
+            const PackMask plain = (signed2 > zero) & (area2 > longest2 * longest2);
+            least = smaller(least, signed2);
+            if (all(plain)) continue;
+            for (int i = 0; i < LANES && t + i < end; ++i) {
+                if (plain[i]) continue;
+                std::array<double, 6> flat;
+                unfold_one(points, triangles, normals, t + i, flat.data());
+                const std::array<std::int32_t, 3> numbers{0, 1, 2};
+                const Edges<2> e = edges_of<2>(flat.data(), numbers.data());
+                if (!is_valid<2>(e, determinant(e), [&] { return corners_of<2>(flat.data(), numbers.data()); }))
+                    part.inverted.push_back(static_cast<std::int32_t>(t + i));
             }
-            for (std::int32_t& s : part.inverted) s += static_cast<std::int32_t>(first);
-            add(parts[item], part);
         }
+        for (int i = 0; i < LANES; ++i) part.min_measure = std::min<double>(part.min_measure, least[i]);
+        part.min_measure = std::copysign(std::sqrt(std::fabs(part.min_measure)), part.min_measure);
+        parts[item] = std::move(part);
     });
     Validity total;
     for (const Validity& part : parts) add(total, part);

@@ -270,7 +270,8 @@ class Method:
         from meshfix_cli.solve.quadratic import RAISED, curved_steps
 
         floor = 1.0 if self.smooth == "best" else RAISED if self.smooth and not self.only_invalid else None
-        untangling = replace(self, smooth=SMOOTH if self.smooth and not self.only_invalid else 0)
+        smooth: Smooth = "best" if self.smooth == "best" else SMOOTH if self.smooth else 0
+        untangling = replace(self, smooth=0 if self.only_invalid else smooth)
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
         return curved_steps(
             mesh, straight, floor=floor, relax=self.curving == "relax", max_move=reach, threads=threads,

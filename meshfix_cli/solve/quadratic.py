@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -23,6 +23,8 @@ from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
 from meshfix_cli.quality.obstacles import proofs_of_curved
+from meshfix_cli.solve.curved_shape import better_shapes
+from meshfix_cli.solve.limits import Budget, Limits
 from meshfix_cli.solve.records import SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
 
@@ -34,6 +36,7 @@ CUTS = (3, 3, 3, 6, 6, 6)  # of what is invalid then, into parts half as large, 
 BARELY = 1e-3  # relative to the straight element: up to there the programme raises coefficients
 RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
 MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
+MINIMISATIONS_OF_HOPELESS = 4
 SHRINK = 0.4  # of eps from one minimisation to the next
 POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far as the second
 POOR_JACOBIAN = 0.2  # scaled, at nodes
@@ -51,39 +54,6 @@ RELAXING = "curved boundary gives way"
 
 Step = tuple[str, Array]
 Steps = Iterator[tuple["Mesh", SweepRecord]]
-
-
-@dataclass(frozen=True)
-class Limits:
-    """What may move, and how far.
-
-    Attributes
-    ----------
-    free : (n,) bool
-    start : (n, d) float64
-        Where the nodes were.
-    max_move : float
-        How far from there they may go, in model units.
-    threads : int
-        The result has the same bits for any number.
-    """
-
-    free: Mask
-    start: Array
-    max_move: float = math.inf
-    threads: int = 1
-
-
-class Budget:
-    """How many untangling sweeps are left; what is tried is one, whether or not it is any good. None: no end."""
-
-    def __init__(self, sweeps: int | None = None) -> None:
-        self.left = math.inf if sweeps is None else sweeps
-
-    def take(self) -> bool:
-        """Use one up, if there is one."""
-        self.left -= 1
-        return self.left >= 0
 
 
 def steps(
@@ -104,8 +74,14 @@ def steps(
     """
     run = _Run(mesh, points, limits, budget)
     yield from run.untangle()
-    if floor is not None and run.left == 0 and (floor == 1 or run.now.smallest < POOR):
+    if floor is None or run.left:
+        return
+    if floor == 1 or run.now.smallest < POOR:
         yield from run.raise_to(floor)
+    best = floor == 1
+    nodes = run.free if best else run.free & (run.points != points).any(axis=1)
+    for better in better_shapes(mesh, run.points, limits, nodes, 1.0 if best else POOR_JACOBIAN, thorough=best):
+        yield RAISING, better
 
 
 class _Seen(NamedTuple):
@@ -158,7 +134,7 @@ class _Run:
                 yield from self._programmes(free)
             for rings in regions:
                 if self.left:
-                    yield from self._minimise(free & self.mesh.near(self.now.low, rings))
+                    yield from self.minimise(free & self.mesh.near(self.now.low, rings))
 
     def _programmes(self, free: Mask) -> Iterator[Step]:
         """Sweeps of the linear programme over the nodes of elements that are not certified; the best ones are kept."""
@@ -199,7 +175,8 @@ class _Run:
             self.mesh.kernel, self.points, self.rest, self.sizes, free, *reach, limits.threads
         )
 
-    def _minimise(self, region: Mask) -> Iterator[Step]:
+    def minimise(self, region: Mask) -> Iterator[Step]:
+        """Minimise the energy over the nodes of a region, until no element is invalid."""
         if not region.any():
             return
         energy, eps = self._energy(region), 1.0
@@ -355,14 +332,15 @@ def curved_steps(
 ) -> Steps:
     """Yield a mesh of curved elements and a record, as it came and after each step; see `untangle.steps`.
 
-    Where corners are tangled, the straight elements are untangled first, and the other nodes go along.
+    Where corners are tangled, or all is to be as good as can be, the straight elements are untangled and smoothed
+    first, and the other nodes go along.
 
     Parameters
     ----------
     mesh : Mesh
         With its `quadratic` elements.
     straight : callable
-        Untangles the straight elements, in as many sweeps as are allowed.
+        Untangles the straight elements, in as many sweeps as are allowed, and smooths them.
     floor : float or None
         See `steps`.
     relax : bool
@@ -380,26 +358,30 @@ def curved_steps(
     yield mesh, first
     best, found = mesh, [mesh]
     hopeless = proofs_of_curved(quadratic, mesh.points, limits.free, threads) == 1
-    if _is_tangled(mesh, threads):
+    if floor == 1 or _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
             best = replace(moved, quadratic=quadratic).with_points(followed)
             if record.sweep:
                 budget.left -= not record.phase.startswith(SMOOTHING)
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
-    for start in [best] if best is mesh or best.check(threads)[0] < first.inverted else [best, mesh]:
+        clock.points = best.points
+    enough = best is mesh or (floor != 1 and best.check(threads)[0] < first.inverted)
+    for start in [best] if enough else [best, mesh]:
         best = start
         for name, best in _mended(start, hopeless, limits, floor, budget):
             yield best, clock.record(name, best)
+        found.append(best)
+        if floor == 1:
+            continue
         left = best.judge_curved(threads)[0]
         if not left.any():
             return
-        found.append(best)
         left[quadratic.rows[proofs_of_curved(quadratic, best.points, limits.free, threads) > 0]] = False
         if not left.any():
             break
     best = min(found, key=lambda one: _rank(one, threads))
-    if relax and budget.take():
+    if relax and best.check(threads)[0] and budget.take():
         given = relaxed(quadratic, best.points, limits, quadratic.giving)
         if given is not None:
             best = best.with_points(given)
@@ -416,13 +398,18 @@ def _mended(
 ) -> Iterator[tuple[str, Mesh]]:
     """Yield what is done to curved elements but hopeless ones (k,), and the mesh after it; see `steps`.
 
-    The programme and the energy would try to mend these in vain, and not see what becomes of others.
+    The programme and the energy would try to mend these in vain, and not see what becomes of others: so they come last.
     """
     quadratic, threads = mesh.quadratic, limits.threads
     assert quadratic is not None
     if not hopeless.all():
         others = quadratic.part(~hopeless) if hopeless.any() else quadratic
         for name, points in steps(others, mesh.points, limits, None if hopeless.any() else floor, budget):
+            mesh = mesh.with_points(points)
+            yield name, mesh
+    if hopeless.any():  # what is best for others alone may have been bad for these
+        run = _Run(quadratic, mesh.points, limits, Budget(MINIMISATIONS_OF_HOPELESS))
+        for name, points in run.minimise(run.free & quadratic.near(hopeless, RINGS[0])):
             mesh = mesh.with_points(points)
             yield name, mesh
     invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
@@ -439,7 +426,8 @@ def _mended(
 def _rank(mesh: Mesh, threads: int) -> tuple[int, float]:
     """Return how good a mesh is: the smaller the better."""
     assert mesh.quadratic is not None
-    return mesh.check(threads)[0], -float(mesh.quadratic.judge(mesh.points, threads).smallest.min())
+    inverted, judged = mesh.check(threads)[0], mesh.quadratic.judge(mesh.points, threads)
+    return inverted, -float((judged.smallest if inverted else judged.scaled_jacobians).min())
 
 
 def giving_way(mesh: Mesh, start: Array, max_move: float, threads: int) -> tuple[int, float] | None:

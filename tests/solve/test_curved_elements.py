@@ -15,7 +15,8 @@ from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Quadratic
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.repair import Method
-from meshfix_cli.solve.quadratic import PARTS, POOR, Limits, relaxed, steps
+from meshfix_cli.solve.limits import Limits
+from meshfix_cli.solve.quadratic import PARTS, POOR, relaxed, steps
 
 every = pytest.mark.parametrize("key", list(FAMILIES))
 

@@ -1,0 +1,102 @@
+"""Curved elements by their shapes: the smallest scaled Jacobians are raised, step by step.
+
+The energy of coefficients compares those of an element with its size. Where that is what the edges span at the node of
+the smallest scaled Jacobian, the smallest coefficient is about this Jacobian, and rises with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.judged import VALID
+
+if TYPE_CHECKING:
+    from meshfix_cli.mesh.quadratic import Array, Judgement, Mask, Quadratic
+    from meshfix_cli.solve.limits import Limits
+
+GAINS = (0.5, 0.1, 0.03)  # by which the smallest is to rise, of itself: the first for as long as it does
+REACHED = 0.25  # of that, which is enough
+RINGS = (1, 3)  # around what is below
+MINIMISATIONS, ITERATIONS, SHRINK = 6, 60, 0.3
+KEPT = 0.2  # relative to the straight element: down to there coefficients may fall
+PATIENCE = 5  # times that elements which do not rise are left out
+
+
+class _Seen(NamedTuple):
+    points: Array
+    judged: Judgement
+
+
+def better_shapes(
+    mesh: Quadratic, points: Array, limits: Limits, nodes: Mask, highest: float, *, thorough: bool
+) -> Iterator[Array]:
+    """Yield points (n, d) of which each have a larger smallest scaled Jacobian than those before.
+
+    Parameters
+    ----------
+    mesh : Quadratic
+    points : (n, d) float64
+        Where no element is invalid.
+    limits : Limits
+    nodes : (n,) bool
+        Whose elements are looked at.
+    highest : float
+        The scaled Jacobian from which on an element is well.
+    thorough : bool
+        Go on with small gains, in larger regions, and with other elements where some do not rise.
+    """
+    now, left = _Seen(points, mesh.judge(points, limits.threads)), mesh.with_one(nodes)
+    patience, gains, rings = (PATIENCE, GAINS, RINGS) if thorough else (1, GAINS[:1], RINGS[:1])
+    for _ in range(patience):
+        low = left & (now.judged.scaled_jacobians < highest)
+        for gain in gains if low.any() else ():
+            while True:
+                smallest = float(now.judged.scaled_jacobians[left].min())
+                low = left & (now.judged.scaled_jacobians < min((1 + gain) * smallest, highest))
+                found = _raised(mesh, now, limits, low, gain * smallest, rings) if low.any() else None
+                if found is None:
+                    break
+                now = found
+                yield now.points
+        left = left & ~low
+        if not (low.any() and left.any()):
+            return
+
+
+def _raised(
+    mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, rise: float, rings: tuple[int, ...]
+) -> _Seen | None:
+    """Return points where the worst of some elements are better, and no other becomes as bad, if they are found."""
+    jacobians, sizes = now.judged.scaled_jacobians, mesh.kernel.sizes(now.points, limits.threads)
+    worst = float(jacobians[low].min())
+    sizes = np.maximum(now.judged.smallest / np.maximum(jacobians, worst), KEPT) * sizes
+    for around in rings:
+        region = limits.free & mesh.near(low, around)
+        energy = kernels.QuadraticEnergy(
+            mesh.kernel, now.points, now.points, sizes, region.astype(np.uint8), limits.start, limits.max_move,
+            limits.threads,
+        )  # fmt: skip
+        eps, best = worst + rise, -1.0
+        for _ in range(MINIMISATIONS):
+            energy.minimise(eps, worst + rise, ITERATIONS)
+            points = energy.points(now.points.shape[1])
+            found = _Seen(points, mesh.judge(points, limits.threads))
+            if _is_better(now.judged, found.judged, low, worst + REACHED * rise):
+                return found
+            smallest = float(found.judged.scaled_jacobians[low].min())
+            if smallest <= best:
+                break
+            eps, best = eps * SHRINK, smallest
+    return None
+
+
+def _is_better(before: Judgement, after: Judgement, low: Mask, least: float) -> bool:
+    """Whether some elements are well enough, all are valid, and what has changed for the worse is still well enough."""
+    jacobians, coefficients = after.scaled_jacobians, after.smallest
+    worse, flatter = jacobians < before.scaled_jacobians, coefficients < before.smallest
+    valid = (after.verdicts == VALID).all() and (coefficients[flatter] >= KEPT).all()
+    return bool(valid and (jacobians[low | worse] >= least).all())

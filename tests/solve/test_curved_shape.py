@@ -1,0 +1,74 @@
+"""Shapes of curved elements: the smallest scaled Jacobians rise, and nothing pays for it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from bent import FAMILIES, HIGHER, curved, mesh_of, straight
+from monomials import jacobians, positions
+
+from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.mesh.quadratic import Array, Quadratic
+from meshfix_cli.repair import Method
+from meshfix_cli.solve.curved_shape import KEPT, better_shapes
+from meshfix_cli.solve.limits import Limits
+
+
+def size(key: str) -> float:
+    """How far nodes are moved, of the edges: elements are bad, and valid."""
+    return 0.02 if key in HIGHER else 0.1
+
+
+def risen(quadratic: Quadratic, points: Array, limits: Limits, highest: float = 1.0) -> list[Array]:
+    return [points, *better_shapes(quadratic, points, limits, limits.free, highest, thorough=True)]
+
+
+@pytest.mark.parametrize("key", list(FAMILIES))
+def test_each_step_is_better_and_nothing_pays(key: str) -> None:
+    quadratic, points, free = curved(key, size(key))
+    found = risen(quadratic, points, Limits(free, points))
+    judged = [quadratic.judge(one, 1) for one in found]
+    assert len(found) > 1
+    smallest = [float(one.scaled_jacobians[quadratic.with_one(free)].min()) for one in judged]
+    assert all(after > before for before, after in pairwise(smallest))
+    for before, after in pairwise(judged):
+        assert (after.verdicts == VALID).all()
+        assert (after.smallest >= np.minimum(before.smallest, KEPT)).all()
+    assert found[-1][~free].tobytes() == points[~free].tobytes()
+
+
+@pytest.mark.parametrize("key", ["triangle6", "tetra10", "hexahedron20"])
+def test_threads_make_no_difference_and_no_node_goes_too_far(key: str) -> None:
+    quadratic, points, free = curved(key, size(key))
+    limits = Limits(free, points, 0.05)
+    found = [risen(quadratic, points, replace(limits, threads=threads))[-1] for threads in (1, 2, 3)]
+    assert found[0].tobytes() == found[1].tobytes() == found[2].tobytes()
+    assert 0 < np.linalg.norm(found[0] - points, axis=1).max() <= 0.05 * (1 + 1e-12)
+
+
+def test_what_is_well_enough_or_held_stays() -> None:
+    quadratic, points, free = curved("triangle6", 0.1)
+    low = float(quadratic.judge(points, 1).scaled_jacobians.min())
+    assert len(risen(quadratic, points, Limits(free, points), low)) == 1
+    assert len(risen(quadratic, points, Limits(np.zeros_like(free), points))) == 1
+
+
+def test_the_best_of_all_is_no_worse_than_it_came() -> None:
+    """Corners move as well, as those of straight elements do: what comes out is better than either alone."""
+    points, rows = straight("tetra10")
+    quadratic, points, free = curved("tetra10", 0.05)
+    mesh = mesh_of(quadratic, points, "tetra10", rows, free)
+    before = quadratic.judge(mesh.points, 1).scaled_jacobians.min()
+    results = {}
+    for smooth in ("auto", "best"):
+        after = Method(smooth=smooth).solve(mesh, math.inf, 1).after
+        results[smooth] = quadratic.judge(after.points, 1).scaled_jacobians.min()
+        assert after.check()[0] == 0
+    assert before <= results["auto"] <= results["best"]
+    assert results["best"] > 1.5 * before
+    nodes = after.points[rows[0]]
+    assert jacobians("tetra10", nodes, positions("tetra10")).min() > 0

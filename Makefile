@@ -50,7 +50,8 @@ check: lint test ## lint and test
 
 # What sanitised kernels take minutes for: other tests call the same on elements of the same types and with threads.
 NOT_SANITISED := highs or every_case or max_move or mended or impossible or limit or global or shell \
-  or (best and bits and not quads) or (drawing_reaches and axis1) or nearly_a_fixed_point
+  or (best and bits and not quads) or (drawing_reaches and axis1) or nearly_a_fixed_point or best_is_no_worse \
+  or (on_curves and (method1 or get_better)) or turned_wall or thorough_minimisation
 sanitize: ## run the kernel tests with address and undefined-behaviour sanitisers
 	$(PYTHON) -m venv $(VENV)-sanitize
 	$(VENV)-sanitize/bin/python -m pip install --quiet --disable-pip-version-check --no-compile . pytest \

@@ -16,6 +16,7 @@ from meshfix_cli.mesh.judged import INSIDE, VALID
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.topology import Block, Topology, rows_of
 from meshfix_cli.quality.formulas import evaluate, worst_and_mean
+from meshfix_cli.quality.held import highest
 from meshfix_cli.quality.relative import worst_and_mean_to
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ BIN_WIDTH = 5.0  # degrees, of the histogram of smallest angles
 # The smallest angle of a triangle is at most 60 degrees, of a tetrahedron at most acos(1/3) = 70.5.
 BINS = {2: 12, 3: 15}
 WITHIN = 1 + 1e-9  # times a bound, whatever is rounded
+ROUNDED = 1e-9  # what is nearer to 1 is 1
 JACOBIAN_BINS = 20  # of scaled Jacobians from 0 to 1, where elements are not all simplices
 
 
@@ -436,6 +438,8 @@ def _without_free_node(mesh: Mesh, rows: NDArray[np.int32]) -> NDArray[np.int32]
 def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     """Find what no method can raise: the smallest quality among the elements that have no free vertex.
 
+    Of elements that are not simplices also what edges between held vertices allow at corners of others.
+
     Parameters
     ----------
     mesh : Mesh
@@ -444,14 +448,16 @@ def ceiling(mesh: Mesh, threads: int = 1) -> float | None:
     Returns
     -------
     float or None
-        Degrees, dihedral for tetrahedra, or the scaled Jacobian where elements are not all simplices; None: each
-        element has a free vertex.
+        Degrees, dihedral for tetrahedra, or the scaled Jacobian where elements are not all simplices; None: nothing
+        held is below the best that there is.
     """
     stuck = mesh.stuck(threads)
-    if len(stuck) == 0:
-        return None
     if not mesh.topology.simplicial:
         rows = _without_free_node(mesh, mesh.topology.connectivity.rows[stuck])
-        return float(evaluate("scaled_jacobian", mesh, threads)[rows].min()) if len(rows) else None
+        values = evaluate("scaled_jacobian", mesh, threads)[rows] if len(rows) else np.empty(0)
+        least = min(values.min(initial=math.inf), math.inf if mesh.quadratic is not None else highest(mesh))
+        return float(least) if len(rows) or least < 1 - ROUNDED else None
+    if len(stuck) == 0:
+        return None
     judged = mesh.judged(stuck)
     return math.degrees(float(judged.angles(mesh.along_curve(mesh.points), threads).min()))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
+from meshfix_cli.quality.held import highest_of_corners
 from meshfix_cli.solve.foldover import evened
 from meshfix_cli.solve.region import Region
-from meshfix_cli.solve.shape import FEW_ITERATIONS, SHARP, SHARP_WEIGHT, Goal, corner_weights, shaped
+from meshfix_cli.solve.shape import FEW_ITERATIONS, SHARP, SHARP_WEIGHT, Goal, shaped, weights_of
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
@@ -70,17 +70,6 @@ def evened_where_poor(
 
 
 def ceiling(points: Array, mesh: kernels.Connectivity, free: Mask) -> float:
-    """Return the largest smallest scaled Jacobian that edges between held vertices (n,) allow at the corners there.
-
-    It is at most the sine of the angle between two edges.
-    """
+    """Return the largest smallest scaled Jacobian that edges between held vertices (n,) allow at the corners there."""
     region = Region(mesh, free)
-    weights, rows = corner_weights(mesh, region), region.global_simplices
-    edges = points[rows[:, 1:]] - points[rows[:, :1]]
-    edges /= np.maximum(np.linalg.norm(edges, axis=2, keepdims=True), np.finfo(float).tiny)
-    least = np.inf
-    for i, j in combinations(range(1, rows.shape[1]), 2):
-        held = (weights > 0) & ~free[rows[:, [0, i, j]]].any(axis=1)
-        cosine = (edges[held, i - 1] * edges[held, j - 1]).sum(axis=1)
-        least = min(least, float((weights[held] * np.sqrt(np.maximum(1 - cosine**2, 0))).min(initial=np.inf)))
-    return least
+    return highest_of_corners(points, region.global_simplices, weights_of(mesh, region), ~free)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from meshfix_cli import kernels
-from meshfix_cli.mesh.elements import JUDGED
+from meshfix_cli.quality.held import corner_weights
 from meshfix_cli.solve.region import Region
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def shaped(
         Where the free vertices may go.
     """
     region = Region(mesh, free)
-    weights, owners = corner_weights(mesh, region), _owners(mesh, region)
+    weights, owners = weights_of(mesh, region), _owners(mesh, region)
     vertices, hexahedra = region.hexahedra() if goal.stages else (region.vertices, np.empty((0, 8), dtype=np.int32))
     sliding = () if freedom is None else (freedom.of(region.moving), ANGLE_OF_SLIDING)
     for sharpness, evenness in goal.stages or (PLAIN,):
@@ -96,10 +96,9 @@ def shaped(
     return points
 
 
-def corner_weights(mesh: kernels.Connectivity, region: Region) -> Array:
+def weights_of(mesh: kernels.Connectivity, region: Region) -> Array:
     """Return the weights (s,) of scaled Jacobians, 0 for whole simplices; (0,) where all are."""
-    weights = np.array([one.shape.weight if len(one.shape.simplices) > 1 else 0.0 for one in JUDGED])
-    return np.empty(0) if mesh.simplicial else weights[mesh.codes[mesh.owners[region.rows]]]
+    return np.empty(0) if mesh.simplicial else corner_weights(mesh, mesh.owners[region.rows])
 
 
 def _owners(mesh: kernels.Connectivity, region: Region) -> NDArray[np.int32]:

@@ -12,7 +12,6 @@ C. Geuzaine, J.-F. Remacle, J. Lambrechts, "Robust untangling of curvilinear mes
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -25,7 +24,7 @@ from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
 from meshfix_cli.quality.obstacles import proofs_of_curved
 from meshfix_cli.solve.curved_shape import better_shapes
 from meshfix_cli.solve.limits import Budget, Limits
-from meshfix_cli.solve.records import SweepRecord
+from meshfix_cli.solve.records import Clock, SweepRecord
 from meshfix_cli.solve.strategies import SMOOTHING
 
 if TYPE_CHECKING:
@@ -76,11 +75,31 @@ def steps(
     yield from run.untangle()
     if floor is None or run.left:
         return
-    if floor == 1 or run.now.smallest < POOR:
+    if floor == 1:
+        yield from _as_good_as_can_be(run)
+        return
+    if run.now.smallest < POOR:
         yield from run.raise_to(floor)
-    best = floor == 1
-    nodes = run.free if best else run.free & (run.points != points).any(axis=1)
-    for better in better_shapes(mesh, run.points, limits, nodes, 1.0 if best else POOR_JACOBIAN, thorough=best):
+    moved = run.free & (run.points != points).any(axis=1)
+    for better in better_shapes(mesh, run.points, limits, moved, POOR_JACOBIAN, thorough=False):
+        yield RAISING, better
+
+
+def _as_good_as_can_be(run: _Run) -> Iterator[Step]:
+    """Raise coefficients and then scaled Jacobians, or these alone, if that makes the worst better."""
+
+    def shapes(start: Array) -> list[Array]:
+        return [start, *better_shapes(run.mesh, start, run.limits, run.free, 1.0, thorough=True)]
+
+    def worst(points: Array) -> float:
+        return float(run.mesh.judge(points, run.limits.threads).scaled_jacobians[of_free].min(initial=1.0))
+
+    of_free, alone = run.mesh.with_one(run.free), shapes(run.points)[-1]
+    yield from run.raise_to(1.0)
+    found = shapes(run.points)
+    if worst(alone) > worst(found[-1]):
+        found.append(alone)
+    for better in found[1:]:
         yield RAISING, better
 
 
@@ -353,7 +372,7 @@ def curved_steps(
     """
     quadratic, budget = mesh.quadratic, Budget(sweeps)
     assert quadratic is not None
-    clock, limits = _Clock(mesh, threads), _limits(mesh, mesh.points, max_move, threads)
+    clock, limits = Clock(mesh, threads), _limits(mesh, mesh.points, max_move, threads)
     first = clock.record("input", mesh)
     yield mesh, first
     best, found = mesh, [mesh]
@@ -471,21 +490,3 @@ def _limits(mesh: Mesh, start: Array, max_move: float, threads: int) -> Limits:
     for block in mesh.topology.blocks:
         corners[block.vertices[others[block.rows]]] = False
     return Limits(corners | quadratic.free, start, max_move, threads)
-
-
-class _Clock:
-    """Makes the records of a run."""
-
-    def __init__(self, mesh: Mesh, threads: int) -> None:
-        self.threads, self.points, self.last, self.sweep = threads, mesh.points, "", 0
-        self.time = time.perf_counter()
-
-    def record(self, phase: str, mesh: Mesh) -> SweepRecord:
-        """Return what a step has made of a mesh since the last."""
-        inverted, smallest = mesh.check(self.threads)
-        moved = int((mesh.points != self.points).any(axis=1).sum())
-        self.sweep = 0 if phase in ("input", "best") else self.sweep + 1 if phase == self.last else 1
-        self.points, self.last, now = mesh.points, phase, time.perf_counter()
-        record = SweepRecord(phase, self.sweep, inverted, smallest, moved, now - self.time)
-        self.time = now
-        return record

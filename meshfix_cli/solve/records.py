@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -86,3 +87,21 @@ class Outcome:
         """All is judged, no element is inverted, by its shape or its numbering, and no boundary crosses itself."""
         inverted = self.records[-1].inverted or self.after.topology.misnumbered.any()
         return self.all_judged and not (inverted or self.obstacles)
+
+
+class Clock:
+    """Makes the records of a run that is no loop of phases."""
+
+    def __init__(self, mesh: Mesh, threads: int) -> None:
+        self.threads, self.points, self.last, self.sweep = threads, mesh.points, "", 0
+        self.time = time.perf_counter()
+
+    def record(self, phase: str, mesh: Mesh) -> SweepRecord:
+        """Return what a step has made of a mesh since the last."""
+        inverted, smallest = mesh.check(self.threads)
+        moved = int((mesh.points != self.points).any(axis=1).sum())
+        self.sweep = 0 if phase in ("input", "best") else self.sweep + 1 if phase == self.last else 1
+        self.points, self.last, now = mesh.points, phase, time.perf_counter()
+        record = SweepRecord(phase, self.sweep, inverted, smallest, moved, now - self.time)
+        self.time = now
+        return record

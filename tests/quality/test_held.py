@@ -14,7 +14,7 @@ from meshfix_cli.quality.summary import ceiling, summarise
 def sheared(dimension: int, angle: float) -> Mesh:
     """A block of quadrilaterals or hexahedra whose sides lean by an angle, in degrees."""
     number = np.arange(4**dimension).reshape((4,) * dimension)
-    points = np.stack(np.indices(number.shape), axis=-1).reshape(-1, dimension).astype(float)
+    points = np.moveaxis(np.indices(number.shape), 0, -1).reshape(-1, dimension).astype(float)
     points[:, 0] += math.tan(math.radians(angle)) * points[:, 1]
     ring = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     if dimension == 3:

@@ -197,16 +197,16 @@ def feigned(mesh: Mesh, region: Mask) -> Mask:
     start, end = mesh.topology.edges()
     beside = np.bincount(start, along[end], k) + np.bincount(end, along[start], k)
     lone = np.where(along, beside == 0, (degrees == 0) & (beside < 2))
-    return np.asarray(region & lone & ~_ends(mesh))
+    return np.asarray(region & lone & ~ends(mesh))
 
 
 def meets_features(mesh: Mesh, region: Mask) -> bool:
     """Whether a vertex (k,) of a region is on a feature, neither at the boundary nor held."""
     assert mesh.freedom is not None
-    return bool((region & (mesh.freedom.degrees < 2) & ~_ends(mesh)).any())
+    return bool((region & (mesh.freedom.degrees < 2) & ~ends(mesh)).any())
 
 
-def _ends(mesh: Mesh) -> Mask:
+def ends(mesh: Mesh) -> Mask:
     """Mark the vertices (k,) that are at the boundary, or held."""
     assert mesh.surface is not None and mesh.surface.kept is not None
     return np.asarray(mesh.surface.kept.held | mesh.along_curve(mesh.topology.boundary))

@@ -127,11 +127,19 @@ def crossings_of_surface(mesh: Mesh, threads: int = 1) -> int:
 
 
 def _of_surface(mesh: Mesh, threads: int) -> Obstacles:
-    """Return the elements of a surface that are turned over and have no free vertex; it may cross itself."""
+    """Return the elements of a surface that are turned over and whose vertices are held; it may cross itself."""
     stuck, none = mesh.stuck(threads), np.empty(0, dtype=np.int32)
-    wrong = mesh.judged(stuck).check(mesh.along_curve(mesh.points), threads)[0]
+    wrong = stuck[mesh.judged(stuck).check(mesh.along_curve(mesh.points), threads)[0]]
+    surface = mesh.surface
+    if surface is not None and surface.kept is not None and not surface.has_reference:
+        from meshfix_cli.mesh.sides import facets_of
+        from meshfix_cli.mesh.surface import ends
+
+        # Others that do not move are on features, which a tangle may feign.
+        held = np.append(ends(mesh), True)  # -1: no more vertices
+        wrong = wrong[held[facets_of(mesh.topology)[wrong]].all(axis=1)]
     pairs = np.empty((0, 2), dtype=np.int32)
-    return Obstacles(distinct(mesh.topology.connectivity.rows[stuck[wrong]]), none, pairs, pairs, none)
+    return Obstacles(distinct(mesh.topology.connectivity.rows[wrong]), none, pairs, pairs, none)
 
 
 def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:

@@ -269,9 +269,9 @@ class Method:
         """Run what curved elements need, see `quadratic.curved_steps`."""
         from meshfix_cli.solve.quadratic import RAISED, curved_steps
 
-        floor = 1.0 if self.smooth == "best" else RAISED if self.smooth and not self.only_invalid else None
-        smooth: Smooth = "best" if self.smooth == "best" else SMOOTH if self.smooth else 0
-        untangling = replace(self, smooth=0 if self.only_invalid else smooth)
+        smooth: Smooth = 0 if self.only_invalid or not self.smooth else "best" if self.smooth == "best" else SMOOTH
+        floor = {0: None, "best": 1.0}.get(smooth, RAISED)
+        untangling = replace(self, smooth=smooth)
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
         return curved_steps(
             mesh, straight, floor=floor, relax=self.curving == "relax", max_move=reach, threads=threads,

@@ -194,12 +194,12 @@ class _Run:
             self.mesh.kernel, self.points, self.rest, self.sizes, free, *reach, limits.threads
         )
 
-    def minimise(self, region: Mask) -> Iterator[Step]:
-        """Minimise the energy over the nodes of a region, until no element is invalid."""
+    def minimise(self, region: Mask, most: int = MINIMISATIONS) -> Iterator[Step]:
+        """Minimise the energy over the nodes of a region, until no element is invalid, or so many times."""
         if not region.any():
             return
         energy, eps = self._energy(region), 1.0
-        for _ in range(MINIMISATIONS):
+        for _ in range(most):
             if not self.budget.take():
                 return
             least = energy.minimise(eps, 0.0, ITERATIONS)[2]
@@ -385,7 +385,7 @@ def curved_steps(
                 budget.left -= not record.phase.startswith(SMOOTHING)
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
         clock.points = best.points
-    enough = best is mesh or (floor != 1 and best.check(threads)[0] < first.inverted)
+    enough = (best.points == mesh.points).all() or (floor != 1 and best.check(threads)[0] < first.inverted)
     for start in [best] if enough else [best, mesh]:
         best = start
         for name, best in _mended(start, hopeless, limits, floor, budget):
@@ -399,7 +399,7 @@ def curved_steps(
         left[quadratic.rows[proofs_of_curved(quadratic, best.points, limits.free, threads) > 0]] = False
         if not left.any():
             break
-    best = min(found, key=lambda one: _rank(one, threads))
+    best = min(found, key=lambda one: _rank(one, limits))
     if relax and best.check(threads)[0] and budget.take():
         given = relaxed(quadratic, best.points, limits, quadratic.giving)
         if given is not None:
@@ -427,8 +427,8 @@ def _mended(
             mesh = mesh.with_points(points)
             yield name, mesh
     if hopeless.any():  # what is best for others alone may have been bad for these
-        run = _Run(quadratic, mesh.points, limits, Budget(MINIMISATIONS_OF_HOPELESS))
-        for name, points in run.minimise(run.free & quadratic.near(hopeless, RINGS[0])):
+        run = _Run(quadratic, mesh.points, limits, budget)
+        for name, points in run.minimise(run.free & quadratic.near(hopeless, RINGS[0]), MINIMISATIONS_OF_HOPELESS):
             mesh = mesh.with_points(points)
             yield name, mesh
     invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
@@ -442,11 +442,13 @@ def _mended(
             yield name, mesh
 
 
-def _rank(mesh: Mesh, threads: int) -> tuple[int, float]:
-    """Return how good a mesh is: the smaller the better."""
+def _rank(mesh: Mesh, limits: Limits) -> tuple[int, float, float]:
+    """Return how good a mesh is, the smaller the better: where held nodes keep the worst as it is, the mean tells."""
     assert mesh.quadratic is not None
-    inverted, judged = mesh.check(threads)[0], mesh.quadratic.judge(mesh.points, threads)
-    return inverted, -float((judged.smallest if inverted else judged.scaled_jacobians).min())
+    inverted, judged = mesh.check(limits.threads)[0], mesh.quadratic.judge(mesh.points, limits.threads)
+    values = judged.smallest if inverted else judged.scaled_jacobians
+    worst = values[mesh.quadratic.with_one(limits.free)].min(initial=math.inf)
+    return inverted, -float(worst), -float(values.mean())
 
 
 def giving_way(mesh: Mesh, start: Array, max_move: float, threads: int) -> tuple[int, float] | None:

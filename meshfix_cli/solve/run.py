@@ -201,7 +201,7 @@ class Run(Positions):
         Progress is fewer inverted elements than ever in the run, or a smallest measure that is larger by `PROGRESS`.
         """
         self.changed = kernels.moved(self.points, points, self.threads).view(bool)
-        if self.only_invalid and not phase.moves:
+        if self.only_invalid and not (phase.moves or phase.smooths):
             self.near = self.near | self.changed
         self.points = points
         self._check()
@@ -284,7 +284,7 @@ class Run(Positions):
         angles = self._angles(self.points)
         smallest, near = self._least(angles), self._smoothed(phase)
         if phase.shapes == "few":
-            near = self._grown(self._of(angles < smallest + math.radians(FEW_LIFT)), FEW_RINGS)
+            near = near & self._grown(self._of(angles < smallest + math.radians(FEW_LIFT)), FEW_RINGS)
         if not self._count(near & self.together):
             return
         self.kept = self.points, self.record, smallest

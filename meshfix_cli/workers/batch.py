@@ -105,6 +105,9 @@ def outputs(sources: Sequence[str], folder: str, reports: Sequence[str] = (), re
                 is_input = os.path.realpath(path) == os.path.realpath(other)
                 shared = "an input" if is_input else f"a piece of {other}"
                 raise ValueError(f"{path} is a piece of {source}, and {shared} as well")
+    for name in read:
+        for path in pieces_of(name, name)[0]:
+            inputs.setdefault(os.path.realpath(path), name)
     pairs = [*zip(sources, targets, strict=True), *zip(reports, reports, strict=True)]
     pairs += [(source, target) for source, _, made in pieces for target in made]
     written: dict[str, str] = {}
@@ -186,10 +189,10 @@ def work(task: Task) -> Result:
 
 def _made_before(task: Task) -> Report | None:
     """Return the report on the output, if that is not older than the input, valid, and all that is asked for."""
-    source, target = Path(task.files.source), Path(task.files.target)
-    paths = [source, *map(Path, pieces_of(str(source), str(target))[0])]
+    target, read = Path(task.files.target), [task.files.source]
     if task.morph.reference is not None:
-        paths.append(Path(task.morph.reference))
+        read.append(task.morph.reference)
+    paths = [Path(path) for name in read for path in (name, *pieces_of(name, name)[0])]
     if not target.is_file() or target.stat().st_mtime_ns < max(path.stat().st_mtime_ns for path in paths):
         return None
     try:

@@ -104,6 +104,9 @@ def test_only_what_must_move_moves(name: str) -> None:
     assert outcome.valid
     assert moved(outcome)[vertex]
     assert moved(outcome).sum() <= 20
+    best = untangle(tangled, smooth="best", only_invalid=True)
+    assert best.valid
+    assert not (moved(best) & ~mesh.topology.grown(np.arange(mesh.topology.n) == vertex, 3)).any()
     bound = 2.5 * mesh.mean_edge_length()
     bounded = untangle(tangled, max_move=bound)
     assert bounded.valid

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from meshfix_cli.mesh.judged import VALID
+from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.quadratic import Array, Quadratic
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.repair import Method
@@ -95,8 +96,8 @@ def test_the_boundary_gives_way_by_little() -> None:
     assert not ways[:, 1].any()
 
 
-def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
-    """At the corner of a square one element alone lies between two edges, which turn past each other."""
+def impossible() -> tuple[Mesh, int]:
+    """At the corner of a square one element alone lies between two edges, which turn past each other; which it is."""
     points, rows = straight("triangle6")
     quadratic, points, free = curved("triangle6", 0.2)
     alone = next(v for v in range(len(points)) if (rows[:, :3] == v).sum() == 1)
@@ -104,7 +105,11 @@ def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
     one, other = rows[element, [3 + place, 3 + (place + 2) % 3]]
     ways = points[[one, other]] - points[alone]
     points[[one, other]] += 1.2 * ways[::-1]
-    mesh = mesh_of(quadratic, points, "triangle6", rows, free)
+    return mesh_of(quadratic, points, "triangle6", rows, free), int(element)
+
+
+def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
+    mesh, element = impossible()
     outcome = Method().solve(mesh, math.inf, 1)
     assert outcome.obstacles.inverted.tolist() == [element]
     assert outcome.records[-1].inverted == 1
@@ -113,6 +118,13 @@ def test_what_is_impossible_is_named_and_nothing_worse_is_returned() -> None:
     curved_ones = summarise(relaxing.after).curved
     assert curved_ones is not None
     assert curved_ones.smallest > 0
+
+
+def test_what_is_impossible_takes_no_more_sweeps_than_there_are() -> None:
+    mesh, _ = impossible()
+    for sweeps in range(4):
+        records = Method(smooth=0, sweeps=sweeps).solve(mesh, math.inf, 1).records
+        assert sum(record.sweep > 0 for record in records) <= sweeps
 
 
 def test_what_has_negative_coefficients_wherever_its_node_goes_becomes_valid_all_the_same() -> None:

@@ -72,3 +72,26 @@ def test_the_best_of_all_is_no_worse_than_it_came() -> None:
     assert results["best"] > 1.5 * before
     nodes = after.points[rows[0]]
     assert jacobians("tetra10", nodes, positions("tetra10")).min() > 0
+
+
+def test_an_element_that_is_held_does_not_keep_others_from_their_best() -> None:
+    """It is the worst, whatever becomes of the others."""
+    _, rows = straight("triangle6")
+    quadratic, points, free = curved("triangle6", 0.1)
+    inner = next(row for row in rows if free[row].all())
+    free[inner] = False
+    points[inner[3:]] += 0.3 * (points[inner[:3]].mean(axis=0) - points[inner[3:]])
+    mesh = mesh_of(quadratic, points, "triangle6", rows, free).with_fixed(~free)
+    before = quadratic.judge(points, 1).scaled_jacobians
+    after = quadratic.judge(Method(smooth="best").solve(mesh, math.inf, 1).after.points, 1).scaled_jacobians
+    others = quadratic.with_one(free)
+    assert before[others].min() > before.min() == after.min()
+    assert after[others].min() > before[others].min()
+    assert after.mean() > before.mean()
+
+
+def test_the_best_of_what_is_valid_moves_nothing_where_only_what_is_invalid_may_move() -> None:
+    quadratic, points, free = curved("triangle6", 0.1)
+    mesh = mesh_of(quadratic, points, "triangle6", straight("triangle6")[1], free)
+    after = Method(smooth="best", only_invalid=True).solve(mesh, math.inf, 1).after
+    assert after.points.tobytes() == points.tobytes()

@@ -49,3 +49,5 @@ def test_points_of_no_surface_stay() -> None:
     few, normals = sample[:6], up[:6]
     np.testing.assert_array_equal(refitted(few, rows[:6], normals, few, normals), few)
     np.testing.assert_array_equal(refitted(sample, rows, 0 * up, sample, up), sample)
+    away = np.where(rows[:, None] < 2, [[np.nan, 0.0, 0.0]], sample)
+    np.testing.assert_array_equal(refitted(away, rows[:2], up, sample, up)[2:], sample[2:])

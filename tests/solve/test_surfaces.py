@@ -10,9 +10,12 @@ import surface_bodies
 from surface_measures import folds
 from surfaces import Array, Rows, box, bumps, height, laid, off_torus, tangled, torus
 
+from meshfix_cli.mesh.curved import Smooth
 from meshfix_cli.mesh.mesh import Mesh
+from meshfix_cli.mesh.surface import laid_by_default
+from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.quality.summary import change_of_shape, summarise
-from meshfix_cli.solve.strategies import Smooth
+from meshfix_cli.solve import strategies
 from meshfix_cli.solve.untangle import untangle
 
 BODIES: dict[str, Callable[[], tuple[Array, Rows]]] = {
@@ -23,7 +26,7 @@ BODIES: dict[str, Callable[[], tuple[Array, Rows]]] = {
 def test_smoothing_keeps_to_the_surface_and_raises_the_angles() -> None:
     points, rows = torus(jitter=0.3)
     mesh = laid(points, rows)
-    levels: tuple[tuple[Smooth, float], ...] = (("auto", 20), ("best", 22))
+    levels: tuple[tuple[strategies.Smooth, float], ...] = (("auto", 20), ("best", 22))
     for smooth, least in levels:
         outcome = untangle(mesh, smooth=smooth)
         before, after = summarise(mesh), summarise(outcome.after)
@@ -63,6 +66,23 @@ def test_without_a_reference_the_points_tell_the_surface(body: str) -> None:
     h = outcome.after.mean_edge_length()
     assert outcome.records[0].inverted > 50 and outcome.valid and far.max() < 0.1 * h
     assert summarise(outcome.after).folded == 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("body", BODIES)
+def test_what_is_mended_was_not_called_impossible(body: str, seed: int) -> None:
+    """A tangle seems to put vertices on features, which do not move; it is gone with them."""
+    points, rows = BODIES[body]()
+    mesh = laid(tangled(points, rows, seed), rows)
+    assert untangle(mesh).valid
+    assert not find_obstacles(mesh)
+
+
+def test_what_is_held_is_called_impossible() -> None:
+    points, rows = torus()
+    folded = tangled(points, rows)
+    mesh = laid_by_default(Mesh.build(folded, rows, fixed=np.arange(len(points))), Smooth(40.0, 0.1))
+    assert find_obstacles(mesh).inverted.tolist() == summarise(mesh).inverted_elements.tolist() != []
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -64,7 +64,9 @@ class Crossings {
 
     // Pairs of facets that cross. Those whose boxes only touch along an axis do not: a plane is between them.
     std::vector<std::int32_t> find(int threads) const {
-        return find<D>(threads, [&](std::int32_t a, std::int32_t b) { return shared_by(a, b) < D - 1 && cross(corners_of(a), corners_of(b)); });
+        return find<D>(threads, [&](std::int32_t a, std::int32_t b) {
+            return shared_by(a, b) < D - 1 && cross(corners_of(a), corners_of(b));
+        });
     }
 
     // Pairs of facets (a, b) for which `holds(a, b)` and whose boxes meet, along at least AXES axes beyond touching.

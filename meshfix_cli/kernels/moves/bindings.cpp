@@ -189,8 +189,8 @@ struct ShapeArguments {
 
 auto shape_energy_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                      const Vector<const double>& corners, const Vector<const std::int32_t>& owners,
-                     const Matrix<const std::int32_t>& hexahedra, std::int64_t free, double goal, double floor, double measure, double weight, double sharpness, double evenness,
-                     int threads, const Freedom* freedom, double angle) {
+                     const Matrix<const std::int32_t>& hexahedra, std::int64_t free, double goal, double floor, double measure,
+                     double weight, double sharpness, double evenness, int threads, const Freedom* freedom, double angle) {
     check_freedom(freedom, free);
     const std::size_t d = points.shape(1);
     const ShapeGoal aims{goal, floor, measure, weight, sharpness, evenness, angle};
@@ -216,8 +216,9 @@ std::vector<double> minimised(Function function, int iterations, int threads) {
 // The free points where so many iterations end.
 auto shaped_py(const Matrix<const double>& points, const Matrix<const std::int32_t>& simplices,
                const Vector<const double>& corners, const Vector<const std::int32_t>& owners,
-               const Matrix<const std::int32_t>& hexahedra, std::int64_t free, double goal, double floor, double measure, double weight, double sharpness, double evenness, int iterations,
-               int threads, const Freedom* freedom, double angle) {
+               const Matrix<const std::int32_t>& hexahedra, std::int64_t free, double goal, double floor, double measure,
+               double weight, double sharpness, double evenness, int iterations, int threads, const Freedom* freedom,
+               double angle) {
     check_freedom(freedom, free);
     const std::size_t d = points.shape(1);
     const ShapeGoal aims{goal, floor, measure, weight, sharpness, evenness, angle};
@@ -307,11 +308,11 @@ void bind_moves(nb::module_& m) {
     m.def("linear_program", &linear_program_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "heights"_a);
     m.def("min_norm_point", &min_norm_point_py, "vectors"_a.noconvert());
     m.def("shape_energy", &shape_energy_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
-          "owners"_a.noconvert(), "hexahedra"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "evenness"_a,
-          "threads"_a, "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
+          "owners"_a.noconvert(), "hexahedra"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a,
+          "sharpness"_a, "evenness"_a, "threads"_a, "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("shaped", &shaped_py, "points"_a.noconvert(), "simplices"_a.noconvert(), "corners"_a.noconvert(),
-          "owners"_a.noconvert(), "hexahedra"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a, "sharpness"_a, "evenness"_a,
-          "iterations"_a, "threads"_a, "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
+          "owners"_a.noconvert(), "hexahedra"_a.noconvert(), "free"_a, "goal"_a, "floor"_a, "measure"_a, "weight"_a,
+          "sharpness"_a, "evenness"_a, "iterations"_a, "threads"_a, "freedom"_a = nb::none(), "angle"_a = SHAPE_ANGLE);
     m.def("mean_ratio", &mean_ratio_py, "neighbours"_a.noconvert(), "faces"_a.noconvert(), "x"_a.noconvert());
     m.attr("DONE") = DONE;
     m.attr("DUE") = DUE;

@@ -138,9 +138,9 @@ inline double fall(double r2) {
 // none, by what is left of them: `smooth` of their distance.
 inline double height_of_quadric(const Sample& sample, const double* points, const double* seen, const Vec<3>& p, const Vec<3>& up,
                                 double smooth) {
-    int told = 0;
     Sample::Near near;
     const int count = sample.nearest(p, near);
+    if (count < QUADRIC_LEAST) return 0.0;  // none, where p is not finite
     const double size = std::sqrt(near[count - 1].first), scale = 1.0 / size;
     if (!(norm2(up) > 0.0 && size > 0.0)) return 0.0;
     const Plane plane(up);
@@ -148,6 +148,7 @@ inline double height_of_quadric(const Sample& sample, const double* points, cons
     std::array<double, 6> right{};
     std::array<std::array<double, 6>, Sample::NEAREST> terms;
     std::array<double, Sample::NEAREST> weights, heights;
+    int told = 0;
     for (int i = 0; i < count; ++i) {
         const std::int64_t row = static_cast<std::int64_t>(near[i].second) * 3;
         const Vec<3> off = scale * (load<3>(points + row) - p);

@@ -27,6 +27,7 @@ Figures = tuple[float, ...]
 STEPS = 2.0**32  # of 1: sums of integers do not depend on their order
 HALVINGS = 8  # of the way of what is worse; then it goes all the way back
 RETREATS = 20
+SHRUNK = 5e-4  # of the smallest area or volume at a corner: scaled Jacobians do not mind edges that shrink to nothing
 KEPT = 0.9  # of the first percentile of the default: what others gain may cost it so much
 STALL = 0.01  # of the score: candidates that gain no more in their last turns are the last of their kind
 MEAN = 5.0  # what the mean counts, and the smallest 1: it is that of all elements, and seldom gains much
@@ -50,7 +51,7 @@ class Compared:
         self.rises: list[float] = []
         self._last = self._values = np.empty(0)
         self._least: Figures = (-math.inf,) * 5
-        self._score = -math.inf
+        self._score = self._least_measure = -math.inf
 
     def add(self, points: Array, vertices_of: Callable[[Mask], Mask]) -> Array:
         """Compare one more; return its points with what is too low drawn back to the last.
@@ -65,11 +66,12 @@ class Compared:
         if not self._will_do(figures):
             points = self._drawn_back(points, figures, vertices_of)
             values, figures = self._judged(points)
-            if not self._will_do(figures):
-                self.rises.append(0.0)
-                return self._last
+        if not self._will_do(figures) or self._measure(points) < self._least_measure:
+            self.rises.append(0.0)
+            return self._last
         if not self.rises:
             self._least = (*figures[:4], KEPT * figures[4])
+            self._least_measure = SHRUNK * self._measure(points)
         self._last, self._values = points, values
         score = figures[0] + MEAN * figures[2]
         self.rises.append(score - self._score)
@@ -92,6 +94,9 @@ class Compared:
     def stalls(self, turns: int) -> bool:
         """Whether the last turns, of two each, gained little."""
         return sum(max(rise, 0.0) for rise in self.rises[-2 * turns :]) < STALL
+
+    def _measure(self, points: Array) -> float:
+        return self._team.least(self._elements.check(points, self._threads)[1])
 
     def _will_do(self, figures: Figures) -> bool:
         return all(one >= least - SAME for one, least in zip(figures, self._least, strict=True))

@@ -9,9 +9,10 @@ from elements import MESHES, tangles
 from meshfix_cli import Mesh, kernels, untangle
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.formulas import evaluate
-from meshfix_cli.solve.compared import KEPT
+from meshfix_cli.solve.compared import KEPT, SHRUNK, Compared
 from meshfix_cli.solve.even import ceiling
 from meshfix_cli.solve.shape import SHARP, SHARP_WEIGHT, Goal, shaped
+from meshfix_cli.solve.team import Alone
 
 
 def tangled(name: str, how: str) -> Mesh:
@@ -28,6 +29,7 @@ def test_no_figure_is_below_the_defaults(name: str) -> None:
     mesh = tangled(name, "P=25 D=2h")
     default, best = untangle(mesh).after, untangle(mesh, smooth="best").after
     assert best.check()[0] == 0
+    assert best.check()[1] >= SHRUNK * default.check()[1]  # edges do not shrink to nothing
     for before, after in (
         (evaluate("scaled_jacobian", default), evaluate("scaled_jacobian", best)),
         (corners(default), corners(best)),
@@ -36,6 +38,18 @@ def test_no_figure_is_below_the_defaults(name: str) -> None:
         assert after.mean() >= before.mean() - 1e-8
     figures = [evaluate("scaled_jacobian", mesh) for mesh in (default, best)]
     assert np.percentile(figures[1], 1, method="lower") >= KEPT * np.percentile(figures[0], 1, method="lower") - 1e-8
+
+
+def test_what_has_shrunk_to_nothing_is_not_taken() -> None:
+    """Scaled Jacobians are the same at any size, and a file has so many digits."""
+    mesh = Mesh.build(*MESHES["hex plate"]())
+    elements = Judged(mesh.topology.stars(1))
+    compared = Compared(mesh, elements, np.ones(len(elements), dtype=bool), Alone(mesh, 1), 1)
+    points = mesh.along_curve(mesh.points)
+    compared.add(points, lambda mask: mask)
+    small, tiny = (points * size for size in (0.9, 0.01))
+    assert compared.add(small, lambda mask: mask) is small
+    assert compared.add(tiny, lambda mask: mask) is small
 
 
 def test_the_bits_are_those_of_one_thread() -> None:

@@ -18,12 +18,33 @@ if TYPE_CHECKING:
     from meshfix_cli.mesh.quadratic import Array, Judgement, Mask, Quadratic
     from meshfix_cli.solve.limits import Limits
 
-GAINS = (0.5, 0.1, 0.03)  # by which the smallest is to rise, of itself: the first for as long as it does
 REACHED = 0.25  # of that, which is enough
-RINGS = (1, 3)  # around what is below
-MINIMISATIONS, ITERATIONS, SHRINK = 6, 60, 0.3
+ITERATIONS, SHRINK = 60, 0.3  # of a minimisation, and of eps from one to the next
 KEPT = 0.2  # relative to the straight element: down to there coefficients may fall
-PATIENCE = 5  # times that elements which do not rise are left out
+
+
+class _Effort(NamedTuple):
+    """How much is tried.
+
+    Attributes
+    ----------
+    patience : int
+        How often elements that do not rise are left out, and others raised; 1: these are the last.
+    gains : tuple of float
+        By which the smallest is to rise, of itself: each for as long as it does.
+    rings : tuple of int
+        Around what is below.
+    minimisations : int
+        In one region.
+    """
+
+    patience: int
+    gains: tuple[float, ...]
+    rings: tuple[int, ...]
+    minimisations: int
+
+
+THOROUGH, QUICK = _Effort(5, (0.5, 0.1, 0.03), (1, 3), 6), _Effort(1, (0.5,), (1,), 2)
 
 
 class _Seen(NamedTuple):
@@ -50,14 +71,14 @@ def better_shapes(
         Go on with small gains, in larger regions, and with other elements where some do not rise.
     """
     now, left = _Seen(points, mesh.judge(points, limits.threads)), mesh.with_one(nodes)
-    patience, gains, rings = (PATIENCE, GAINS, RINGS) if thorough else (1, GAINS[:1], RINGS[:1])
-    for _ in range(patience):
+    effort = THOROUGH if thorough else QUICK
+    for _ in range(effort.patience):
         low = left & (now.judged.scaled_jacobians < highest)
-        for gain in gains if low.any() else ():
+        for gain in effort.gains if low.any() else ():
             while True:
                 smallest = float(now.judged.scaled_jacobians[left].min())
                 low = left & (now.judged.scaled_jacobians < min((1 + gain) * smallest, highest))
-                found = _raised(mesh, now, limits, low, gain * smallest, rings) if low.any() else None
+                found = _raised(mesh, now, limits, low, gain * smallest, effort) if low.any() else None
                 if found is None:
                     break
                 now = found
@@ -67,21 +88,19 @@ def better_shapes(
             return
 
 
-def _raised(
-    mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, rise: float, rings: tuple[int, ...]
-) -> _Seen | None:
+def _raised(mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, rise: float, effort: _Effort) -> _Seen | None:
     """Return points where the worst of some elements are better, and no other becomes as bad, if they are found."""
     jacobians, sizes = now.judged.scaled_jacobians, mesh.kernel.sizes(now.points, limits.threads)
     worst = float(jacobians[low].min())
     sizes = np.maximum(now.judged.smallest / np.maximum(jacobians, worst), KEPT) * sizes
-    for around in rings:
-        region = limits.free & mesh.near(low, around)
+    for rings in effort.rings:
+        region = limits.free & mesh.near(low, rings)
         energy = kernels.QuadraticEnergy(
             mesh.kernel, now.points, now.points, sizes, region.astype(np.uint8), limits.start, limits.max_move,
             limits.threads,
         )  # fmt: skip
         eps, best = worst + rise, -1.0
-        for _ in range(MINIMISATIONS):
+        for _ in range(effort.minimisations):
             energy.minimise(eps, worst + rise, ITERATIONS)
             points = energy.points(now.points.shape[1])
             found = _Seen(points, mesh.judge(points, limits.threads))

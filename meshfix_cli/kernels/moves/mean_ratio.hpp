@@ -6,6 +6,7 @@
 // Source: P. Knupp, "Algebraic mesh quality metrics", SIAM J. Sci. Comput. 23 (2001).
 #pragma once
 
+#include "common/cholesky.hpp"
 #include "measures/sines.hpp"
 
 namespace meshfix {
@@ -26,28 +27,9 @@ struct StarSum {
 
     // Newton's step by Cholesky's factors; steepest descent over a tenth of the star where the sum is not convex.
     Vec<D> step(double radius) const {
-        std::array<Vec<D>, D> l = hessian;
-        for (int i = 0; i < D; ++i)
-            for (int j = 0; j <= i; ++j) {
-                for (int k = 0; k < j; ++k) l[i][j] -= l[i][k] * l[j][k];
-                if (j < i) {
-                    l[i][j] /= l[j][j];
-                } else if (l[i][i] > NEWTON_PIVOT * hessian[i][i]) {
-                    l[i][i] = std::sqrt(l[i][i]);
-                } else {
-                    return (-0.1 * radius / std::sqrt(norm2(gradient))) * gradient;
-                }
-            }
-        Vec<D> x;
-        for (int i = 0; i < D; ++i) {
-            x[i] = -gradient[i];
-            for (int k = 0; k < i; ++k) x[i] -= l[i][k] * x[k];
-            x[i] /= l[i][i];
-        }
-        for (int i = D; i-- > 0;) {
-            for (int k = i + 1; k < D; ++k) x[i] -= l[k][i] * x[k];
-            x[i] /= l[i][i];
-        }
+        std::array<Vec<D>, D> rows = hessian;
+        Vec<D> x = -1.0 * gradient;
+        if (!solve_positive<D>(rows, x, NEWTON_PIVOT)) return (-0.1 * radius / std::sqrt(norm2(gradient))) * gradient;
         return x;
     }
 };

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/cholesky.hpp"
 #include "common/parallel.hpp"
 #include "common/tolerances.hpp"
 #include "surface/unfold.hpp"
@@ -107,26 +108,6 @@ class Sample {
     std::vector<Node> nodes_{};
 };
 
-// Solves the symmetric positive system of N unknowns, of which `left` has the lower triangle; false: it is not positive.
-template <int N>
-bool solve_positive(std::array<std::array<double, N>, N>& left, std::array<double, N>& right) {
-    for (int i = 0; i < N; ++i) {
-        for (int j = 0; j <= i; ++j) {
-            double sum = left[i][j];
-            for (int k = 0; k < j; ++k) sum -= left[i][k] * left[j][k];
-            if (i == j && !(sum > 0.0)) return false;
-            left[i][j] = i == j ? std::sqrt(sum) : sum / left[j][j];
-        }
-        for (int k = 0; k < i; ++k) right[i] -= left[i][k] * right[k];
-        right[i] /= left[i][i];
-    }
-    for (int i = N; i-- > 0;) {
-        for (int k = i + 1; k < N; ++k) right[i] -= left[k][i] * right[k];
-        right[i] /= left[i][i];
-    }
-    return true;
-}
-
 // A weight that falls nearly as exp(-4 r^2) does, of r^2 from 0 to 1.
 inline double fall(double r2) {
     double power = 1.0 - 0.25 * r2;
@@ -164,7 +145,7 @@ inline double height_of_quadric(const Sample& sample, const double* points, cons
         }
     }
     for (int j = 0; j < 6; ++j) left[j][j] += QUADRIC_RIDGE;
-    if (told < QUADRIC_LEAST || !solve_positive<6>(left, right)) return 0.0;
+    if (told < QUADRIC_LEAST || !solve_positive<6>(left, right, 0.0)) return 0.0;
     double rest = 0.0, total = 0.0;
     for (int i = 0; i < count; ++i) {
         double off = heights[i];

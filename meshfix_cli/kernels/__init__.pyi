@@ -9,6 +9,7 @@ from meshfix_cli.kernels._obstacles import crossings as crossings
 from meshfix_cli.kernels._obstacles import crossings_and_folds as crossings_and_folds
 from meshfix_cli.kernels._obstacles import enclosing as enclosing
 from meshfix_cli.kernels._obstacles import exclusive as exclusive
+from meshfix_cli.kernels._quadratic import QUADRATIC_PROVED as QUADRATIC_PROVED
 from meshfix_cli.kernels._quadratic import QUADRATIC_SHAPES as QUADRATIC_SHAPES
 from meshfix_cli.kernels._quadratic import QuadraticEnergy as QuadraticEnergy
 from meshfix_cli.kernels._quadratic import QuadraticMesh as QuadraticMesh

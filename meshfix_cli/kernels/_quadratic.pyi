@@ -7,6 +7,7 @@ from meshfix_cli.kernels import Float64, Int32, Uint8
 # For each type of `mesh.quadratic.SECOND_ORDER` its dimension, the corners whose mean each node is in the straight
 # element, and the weight of scaled Jacobians.
 QUADRATIC_SHAPES: list[tuple[int, list[list[int]], float]]
+QUADRATIC_PROVED: int
 
 class QuadraticType:
     """A type of more than second order."""

@@ -19,10 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
 
-HIGHEST = 6  # order of which anything is proved: beyond, rounding has a part in it
 NEWTON = 12  # steps
 BOX = 1e-6  # of the parameters, half the width
 ROUNDED = 1e-13  # relative to the face: what a derivative may be off by
@@ -65,7 +65,7 @@ def _faces(element: Element) -> tuple[_Face, ...]:
     order = 2 if element.lattice is None else element.lattice.order
     weights = np.concatenate([np.eye(element.shape.corners), np.array(element.weights)])
     found = []
-    for corners in element.shape.facets if element.shape.dimension == 3 and order <= HIGHEST else ():
+    for corners in element.shape.facets if element.shape.dimension == 3 and order <= kernels.QUADRATIC_PROVED else ():
         shares = weights[:, list(corners)]
         nodes, triangular = np.flatnonzero(shares.sum(axis=1) > 1 - 1e-9), len(corners) == 3
         at = shares[nodes] @ np.array([[0, 0], [1, 0], [0, 1]] if triangular else [[0, 0], [1, 0], [1, 1], [0, 1]])

@@ -187,6 +187,7 @@ auto evaluate_py(PyQuadraticEnergy& self, const Vector<const double>& variables,
 
 void bind_quadratic(nb::module_& m) {
     m.attr("QUADRATIC_SHAPES") = nb::cast(shapes_py());
+    m.attr("QUADRATIC_PROVED") = QUADRATIC_PROVED;
     nb::class_<QuadraticType>(m, "QuadraticType")
         .def("__init__", &init_type, "factors"_a, "order"_a, "places"_a.noconvert(), "weight"_a);
     nb::class_<QuadraticMesh>(m, "QuadraticMesh")

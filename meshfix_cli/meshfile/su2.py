@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from meshfix_cli.errors import ReadError
-from meshfix_cli.mesh.lagrange import Kind, kinds
+from meshfix_cli.mesh.lagrange import Kind, key_of, kinds
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
 from meshfix_cli.meshfile.tables import (
@@ -140,9 +140,10 @@ def _type_of(number: int) -> _Type | None:
     if not raised:
         return (name, size, slice(None)) if size else None
     kind = Kind(name, raised + 1, True)
-    key = next((key for key, one in kinds().items() if one == kind), None)
-    order = [] if key is None else kind.order_of("rows")
-    return (key, len(order), order) if key else None
+    if kind not in kinds().values():
+        return None
+    order = kind.order_of("rows")
+    return key_of(kind), len(order), order
 
 
 def _corners(table: IntegerLines, size: int, order: _Order, rows: Int64) -> Places:

@@ -66,12 +66,13 @@ class Compared:
         if not self._will_do(figures):
             points = self._drawn_back(points, figures, vertices_of)
             values, figures = self._judged(points)
-        if not self._will_do(figures) or self._measure(points) < self._least_measure:
+        measure = self._team.least(self._elements.check(points, self._threads)[1])
+        if not self._will_do(figures) or measure < self._least_measure:
             self.rises.append(0.0)
             return self._last
         if not self.rises:
             self._least = (*figures[:4], KEPT * figures[4])
-            self._least_measure = SHRUNK * self._measure(points)
+            self._least_measure = SHRUNK * measure
         self._last, self._values = points, values
         score = figures[0] + MEAN * figures[2]
         self.rises.append(score - self._score)
@@ -94,9 +95,6 @@ class Compared:
     def stalls(self, turns: int) -> bool:
         """Whether the last turns, of two each, gained little."""
         return sum(max(rise, 0.0) for rise in self.rises[-2 * turns :]) < STALL
-
-    def _measure(self, points: Array) -> float:
-        return self._team.least(self._elements.check(points, self._threads)[1])
 
     def _will_do(self, figures: Figures) -> bool:
         return all(one >= least - SAME for one, least in zip(figures, self._least, strict=True))

@@ -148,7 +148,8 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
     Inverted are those that are so wherever free nodes go; they exclude each other where one free node, or one free edge
     at an end of it, is common to them, and no position or tangent of it makes all of them valid.
     """
-    proofs = proofs_of_curved(quadratic, mesh.points, mesh.movable | quadratic.free, threads)
+    invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
+    proofs = proofs_of_curved(quadratic, mesh.points, mesh.movable | quadratic.free, invalid)
     straight = find_obstacles(replace(mesh, quadratic=None), threads)
     alone, together = quadratic.rows[proofs == 1], np.sort(quadratic.rows[proofs == 2]).astype(np.int32)
     alone = np.union1d(alone, np.setdiff1d(straight.inverted, quadratic.rows)).astype(np.int32)
@@ -158,11 +159,10 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
     return Obstacles(alone, together, crossing, folding, straight.overlapping[~bent[straight.overlapping]])
 
 
-def proofs_of_curved(quadratic: Quadratic, points: Array, free: Mask, threads: int) -> NDArray[np.uint8]:
-    """Mark curved elements (k,) that are not valid wherever free nodes go: 1 by themselves, 2 together with others."""
+def proofs_of_curved(quadratic: Quadratic, points: Array, free: Mask, invalid: Mask) -> NDArray[np.uint8]:
+    """Mark invalid curved elements (k,) that are so wherever free nodes go: 1 by themselves, 2 together with others."""
     proofs = quadratic.kernel.impossible(points, free.astype(np.uint8))
-    asked = (quadratic.judge(points, threads).verdicts != VALID) & (proofs == 0)
-    proofs[pinched(quadratic, points, free, asked)] = 1
+    proofs[pinched(quadratic, points, free, invalid & (proofs == 0))] = 1
     return proofs
 
 

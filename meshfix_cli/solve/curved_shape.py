@@ -11,14 +11,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import VALID
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.quadratic import Array, Judgement, Mask, Quadratic
     from meshfix_cli.solve.limits import Limits
 
-REACHED = 0.25  # of that, which is enough
+REACHED = 0.25  # share of a gain that is enough
 ITERATIONS, SHRINK = 60, 0.3  # of a minimisation, and of eps from one to the next
 KEPT = 0.2  # relative to the straight element: down to there coefficients may fall
 
@@ -72,33 +71,30 @@ def better_shapes(
     """
     now, left = _Seen(points, mesh.judge(points, limits.threads)), mesh.with_one(nodes)
     effort = THOROUGH if thorough else QUICK
+
+    def below(gain: float) -> Mask:
+        jacobians = now.judged.scaled_jacobians
+        return left & (jacobians < min((1 + gain) * jacobians[left].min(initial=highest), highest))
+
     for _ in range(effort.patience):
-        low = left & (now.judged.scaled_jacobians < highest)
-        for gain in effort.gains if low.any() else ():
-            while True:
-                smallest = float(now.judged.scaled_jacobians[left].min())
-                low = left & (now.judged.scaled_jacobians < min((1 + gain) * smallest, highest))
-                found = _raised(mesh, now, limits, low, gain * smallest, effort) if low.any() else None
-                if found is None:
-                    break
+        for gain in effort.gains:
+            while (low := below(gain)).any() and (found := _raised(mesh, now, limits, low, gain, effort)):
                 now = found
                 yield now.points
-        left = left & ~low
-        if not (low.any() and left.any()):
+        if not low.any():
             return
+        left = left & ~low
 
 
-def _raised(mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, rise: float, effort: _Effort) -> _Seen | None:
+def _raised(mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, gain: float, effort: _Effort) -> _Seen | None:
     """Return points where the worst of some elements are better, and no other becomes as bad, if they are found."""
     jacobians, sizes = now.judged.scaled_jacobians, mesh.kernel.sizes(now.points, limits.threads)
     worst = float(jacobians[low].min())
+    rise = gain * worst
     sizes = np.maximum(now.judged.smallest / np.maximum(jacobians, worst), KEPT) * sizes
     for rings in effort.rings:
         region = limits.free & mesh.near(low, rings)
-        energy = kernels.QuadraticEnergy(
-            mesh.kernel, now.points, now.points, sizes, region.astype(np.uint8), limits.start, limits.max_move,
-            limits.threads,
-        )  # fmt: skip
+        energy = limits.energy(mesh, now.points, now.points, sizes, region)
         eps, best = worst + rise, -1.0
         for _ in range(effort.minimisations):
             energy.minimise(eps, worst + rise, ITERATIONS)

@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from meshfix_cli.mesh.quadratic import Array, Mask
+import numpy as np
+
+from meshfix_cli import kernels
+from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
 
 
 @dataclass(frozen=True)
@@ -27,6 +30,16 @@ class Limits:
     start: Array
     max_move: float = math.inf
     threads: int = 1
+
+    def energy(
+        self, mesh: Quadratic, points: Array, rest: Array, sizes: Array, region: Mask
+    ) -> kernels.QuadraticEnergy:
+        """Return the energy of coefficients from points (n, d) on, over the nodes of a region (n,).
+
+        `rest` (n, d) has the straight elements' corners, and `sizes` (m,) what coefficients are compared with.
+        """
+        free = region.astype(np.uint8)
+        return kernels.QuadraticEnergy(mesh.kernel, points, rest, sizes, free, self.start, self.max_move, self.threads)
 
 
 class Budget:

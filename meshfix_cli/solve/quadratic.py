@@ -188,11 +188,7 @@ class _Run:
         return self.mesh.kernel.relocate(points, self.sizes, free, rows, start, reach, BARELY, tied, halvings)[0]
 
     def _energy(self, region: Mask) -> kernels.QuadraticEnergy:
-        limits, free = self.limits, region.astype(np.uint8)
-        reach = limits.start, limits.max_move
-        return kernels.QuadraticEnergy(
-            self.mesh.kernel, self.points, self.rest, self.sizes, free, *reach, limits.threads
-        )
+        return self.limits.energy(self.mesh, self.points, self.rest, self.sizes, region)
 
     def minimise(self, region: Mask, most: int = MINIMISATIONS) -> Iterator[Step]:
         """Minimise the energy over the nodes of a region, until no element is invalid, or so many times."""
@@ -314,7 +310,7 @@ def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array
         moved = start.copy()
         moved[held] = points[held] + shares[held, None] * way[held]
         run = _Run(mesh, moved, limits, Budget(RELAXING_SWEEPS))
-        proved = run.now.invalid & (proofs_of_curved(mesh, moved, limits.free, limits.threads) > 0)
+        proved = run.now.invalid & (proofs_of_curved(mesh, moved, limits.free, run.now.invalid) > 0)
         if proved.any():  # to try would be in vain
             return start, proved
         for _ in run.untangle(RELAXING_RINGS):
@@ -376,7 +372,8 @@ def curved_steps(
     first = clock.record("input", mesh)
     yield mesh, first
     best, found = mesh, [mesh]
-    hopeless = proofs_of_curved(quadratic, mesh.points, limits.free, threads) == 1
+    invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
+    hopeless = proofs_of_curved(quadratic, mesh.points, limits.free, invalid) == 1
     if floor == 1 or _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
@@ -396,7 +393,8 @@ def curved_steps(
         left = best.judge_curved(threads)[0]
         if not left.any():
             return
-        left[quadratic.rows[proofs_of_curved(quadratic, best.points, limits.free, threads) > 0]] = False
+        proofs = proofs_of_curved(quadratic, best.points, limits.free, left[quadratic.rows])
+        left[quadratic.rows[proofs > 0]] = False
         if not left.any():
             break
     best = min(found, key=lambda one: _rank(one, limits))
@@ -434,7 +432,7 @@ def _mended(
     invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
     if not (invalid & ~hopeless).any():
         return
-    proved = hopeless | (proofs_of_curved(quadratic, mesh.points, limits.free, threads) > 0)
+    proved = hopeless | (proofs_of_curved(quadratic, mesh.points, limits.free, invalid) > 0)
     if (invalid & ~proved).any():
         run = _Run(quadratic.part(~(hopeless | (invalid & proved))), mesh.points, limits, budget)
         for name, points in run.of_parts():

@@ -47,6 +47,7 @@ GOAL = {2: 1.3, 3: 1.6}  # times the threshold: up to there, where three passes 
 GOAL_RINGS = 4  # around the elements below the goal that are smoothed
 GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
 GOAL_PATIENCE = 2
+ON_INVALID_STARS = (Move.UNTANGLE_HEIGHTS, Move.UNTANGLE_COEFFICIENTS, Move.UNTANGLE_MOST)
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LET_DOWN = 0.8  # of the smallest angle of a surface, to which the first of these may take it
@@ -82,7 +83,7 @@ PACE, SLIDING_PACE = Pace(0.01, 0.05, 1.0, ITERATIONS), Pace(0.03, 0.5, 0.9, 40)
 
 def _is_of_surfaces(phase: Phase) -> bool:
     """Whether a phase works in tangent planes: sweeps, and the shape of elements by their means."""
-    if Move.COME_BACK in phase.moves or phase.to_reference:
+    if {Move.COME_BACK, Move.UNTANGLE_MOST} & set(phase.moves) or phase.to_reference:
         return False
     if phase.slides and Move.DRAW_BACK not in phase.moves:  # as all do
         return False
@@ -212,11 +213,19 @@ class Run(Positions):
         if Move.LAPLACIAN in phase.moves:
             self.hard = self.promising > 0 or self.most or (self.many and sweep > EASY)
         now = (self.points, self.record, self._rank())
-        is_best = self.best is None or now[2] < self.best[2] or Move.DRAW_BACK in phase.moves
-        self.best = now if is_best else self.best
+        if self.best is None or now[2] < self.best[2] or self._is_meant(phase, self.best[2][0]):
+            self.best = now
         progress = self.left < self.fewest or self.measure > self.largest + PROGRESS * abs(self.largest)
         self.fewest, self.largest = min(self.fewest, self.left), max(self.largest, self.measure)
         return progress
+
+    def _is_meant(self, phase: Phase, fewest: int) -> bool:
+        """Whether a mesh that is no better by its smallest measure is what the phase is for.
+
+        As flat as a plane wrong elements can share a place, each with a measure of no more than rounding: of these most
+        are right and some clearly wrong where fewer are meant to be.
+        """
+        return Move.DRAW_BACK in phase.moves or (Move.UNTANGLE_MOST in phase.moves and self.left <= fewest)
 
     def choose(self) -> bool:
         """Go on with the better one of two starts: by what is inverted, else after a few passes; False: it is this."""
@@ -256,7 +265,7 @@ class Run(Positions):
         for move in cycle(phase.moves):
             if len(phase.moves) > 1:  # what was visited by one move is due for the next
                 states = _due(near)
-            if phase.only_invalid and move in (Move.UNTANGLE_HEIGHTS, Move.UNTANGLE_COEFFICIENTS):
+            if phase.only_invalid and move in ON_INVALID_STARS:
                 states = _due(near & (self._broken() | self._grown(self.changed, 1)))
             floor = self._min_sine2(self.mendable) if move is Move.MEAN_RATIO else None
             yield self._relocated(self.points, move, states, floor)

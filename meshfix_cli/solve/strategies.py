@@ -48,6 +48,7 @@ class Move(IntEnum):
     COME_BACK = 8
     UNTANGLE_COEFFICIENTS = 9
     DRAW_BACK = 10
+    UNTANGLE_MOST = 11
 
 
 Smooth = int | Literal["auto", "best"]
@@ -139,6 +140,9 @@ _LP_COEFFICIENTS = Phase(
     "LP on coefficients", (Move.UNTANGLE_COEFFICIENTS,), SWEEPS, until="stalled", only_invalid=True, from_best=True,
     elements=True,
 )  # fmt: skip
+_LP_MOST = Phase(
+    "LP on most of a star", (Move.UNTANGLE_MOST,), SWEEPS, until="stalled", only_invalid=True, from_best=True,
+)  # fmt: skip
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
 _TO_SHAPE = Phase("back to the shape", (Move.DRAW_BACK,), 100, until="settled", from_best=True, slides=True)
@@ -165,6 +169,7 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
         replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
         _FOLDOVER,
         _LP_COEFFICIENTS,
+        _LP_MOST,
     ),
     "LS": (_LAPLACIAN,),
     "US": (_LP, _LP_COEFFICIENTS),

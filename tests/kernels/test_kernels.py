@@ -356,7 +356,7 @@ def test_no_vertex_goes_beyond_its_reach(mesh: Mesh, move: Move) -> None:
                 relocate(start, move, points, blocks, threshold_sine2=threshold, max_move=max_move)
         far = np.linalg.norm(points - start.points, axis=1)
         assert far.max() <= max_move
-        assert (far >= 0.99 * max_move).any()
+        assert (far >= 0.99 * max_move).any() or move is Move.UNTANGLE_MOST  # which goes nowhere for nothing
 
 
 def test_the_linear_programme_gains_on_the_way_too(bracket: Mesh) -> None:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from elements import MESHES, tangles
+from elements import MESHES, box_of_hexahedra, tangles
+from meshes import with_a_rough_boundary
 from numpy.typing import NDArray
 from sampling import jacobians
 from scipy.optimize import linprog, minimize
@@ -14,7 +15,8 @@ from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.solve.foldover import embedding
 from meshfix_cli.solve.records import Outcome
-from meshfix_cli.solve.strategies import Move, Smooth
+from meshfix_cli.solve.strategies import STRATEGIES, Move, Smooth
+from meshfix_cli.solve.untangle import steps
 
 # Of the scaled Jacobians of the mesh before: the smallest, and the mean where nothing turned.
 SMALLEST, MEAN = 0.47, 0.94
@@ -69,6 +71,24 @@ def test_same_bits_for_any_threads(name: str, smooth: Smooth) -> None:
     points = tangles(name, mesh.points, mesh.movable, mesh.mean_edge_length())["P=100 D=8h"]
     ends = {untangle(mesh.with_points(points), smooth=smooth, threads=n).after.points.tobytes() for n in (1, 2, 3)}
     assert len(ends) == 1
+
+
+@pytest.mark.parametrize("seed", [0, 5, 10, 11])
+def test_what_is_impossible_takes_no_others_with_it(seed: int) -> None:
+    """Corners that are held the wrong way round spoil their element alone, and not those that share its vertices."""
+    rough = with_a_rough_boundary(Mesh.build(*box_of_hexahedra(27)), 0.5, seed)
+    outcome = untangle(rough, smooth=0)
+    phases = [phase for phase in STRATEGIES["auto"] if Move.UNTANGLE_MOST not in phase.moves]
+    *_, (_, without) = steps(rough, phases, hopeless=outcome.obstacles.hopeless(rough))
+    assert len(outcome.obstacles.inverted) <= outcome.records[-1].inverted < without.inverted
+    assert outcome.records[-1].inverted == outcome.after.check()[0]
+
+
+def test_without_smoothing_the_best_mesh_is_the_result() -> None:
+    for seed in range(6):
+        rough = with_a_rough_boundary(Mesh.build(*box_of_hexahedra(27)), 0.6, seed)
+        outcome = untangle(rough, smooth=0)
+        assert outcome.records[-1].inverted == min(record.inverted for record in outcome.records)
 
 
 def test_best_is_no_worse_than_the_default() -> None:

@@ -94,6 +94,14 @@ def with_an_inverted_fixed_simplex(mesh: Mesh) -> Mesh:
     return mesh.with_points(points)
 
 
+def with_a_rough_boundary(mesh: Mesh, most: float, seed: int) -> Mesh:
+    """Move each vertex of the boundary by up to so much of a mean edge length along each axis."""
+    points, held = mesh.points.copy(), ~mesh.movable
+    by = most * mesh.mean_edge_length()
+    points[held] += np.random.default_rng(seed).uniform(-by, by, (held.sum(), mesh.dimension))
+    return mesh.with_points(points)
+
+
 def built_for(name: str) -> Any:
     """Another build of the kernels; skips where this processor, or the compiler, has not what it takes."""
     module = pytest.importorskip(f"meshfix_cli.kernels.{name}")

@@ -21,7 +21,7 @@ import elements
 import generate
 from building import Blocks
 from layered import Points, body_of, layered, left_behind
-from meshes import sliding, sliding_on_curves, tangle, with_an_inverted_fixed_simplex
+from meshes import sliding, sliding_on_curves, tangle, with_a_rough_boundary, with_an_inverted_fixed_simplex
 
 from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.mesh.reference import reference_points
@@ -60,6 +60,7 @@ METHODS = {
     "smallbest": Method(smooth="best"),
     "hexes": Method(),
     "hexesFF": Method("FF"),
+    "hexesimpossible": Method(),
     "hexesonlyinvalid": Method(only_invalid=True),
     "solids": Method(smooth="best"),
     "fewsolids": Method(smooth="best"),
@@ -91,6 +92,8 @@ def mesh_of(case: str) -> Mesh:
     for name, made in ELEMENTS.items():
         if case.startswith(name):
             valid = Mesh.build(*made())
+            if case.endswith("impossible"):
+                return with_a_rough_boundary(valid, 0.55, 0)
             return bent(valid) if case.endswith("reference") else tangle(valid, 25, 1 if "only" in case else 2)
     if case.startswith("small"):
         return tangle(Mesh.build(*generate.plate(0.18)))

@@ -334,7 +334,7 @@ void bind_moves(nb::module_& m) {
         .def_prop_ro("evaluations",
                      [](PyFoldover& self) { return self.with_problem([](auto& p) { return p.evaluations(); }); });
 
-    static_assert(static_cast<int>(Move::draw_back) == 10, "the codes of strategies.Move");
+    static_assert(static_cast<int>(Move::untangle_most) == 11, "the codes of strategies.Move");
 }
 
 }  // namespace meshfix

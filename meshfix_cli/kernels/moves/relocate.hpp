@@ -9,6 +9,7 @@
 #include "moves/come_back.hpp"
 #include "moves/laplacian.hpp"
 #include "moves/mean_ratio.hpp"
+#include "moves/most.hpp"
 #include "moves/nearness.hpp"
 #include "moves/programme.hpp"
 
@@ -16,7 +17,7 @@ namespace meshfix {
 
 enum class Move : int {
     laplacian, untangle, combined_untangle, smart_laplacian, combined_smooth, untangle_heights, mean_ratio, raise_smallest,
-    come_back, untangle_coefficients, draw_back
+    come_back, untangle_coefficients, draw_back, untangle_most
 };
 
 // What a sweep knows of each vertex. One is due until it has been visited, and again when it or a neighbour moves:
@@ -44,6 +45,7 @@ struct Relocation {
 
     Star<D> star{};
     Programme<D> program{};
+    MostOfStar<D> most{};
     ActiveSet<D> active_set{};
     std::vector<Affine<D>> functions{};
 
@@ -203,6 +205,17 @@ struct Relocation {
         return store(v, optimum(v));
     }
 
+    // Where not all elements of the star can be right, to where fewer of them are wrong.
+    bool untangle_most(std::int64_t v) {
+        if (star.valid(star.position)) return false;
+        most.set(star, stars, v);
+        const int wrong = most.wrong_at(star.position);
+        if (!most.solve(star, program, wrong)) return false;
+        Vec<D> there = reached(v, program.position, -INFINITY);
+        if (parameters.max_move < INFINITY) there = within_reach(v, there);
+        return most.wrong_at(star.to_local(there)) < wrong && store(v, there);
+    }
+
     // Section 4, CS: Laplacian smoothing, then untangling where the star is still invalid.
     bool combined_untangle(std::int64_t v) {
         const bool moved = store(v, star.directions.anywhere() ? star.origin : reached(v, star.centre, -INFINITY));
@@ -329,6 +342,7 @@ struct Relocation {
             case Move::come_back: counts.moved += come_back(v); break;
             case Move::untangle_coefficients: counts.moved += untangle_coefficients(v); break;
             case Move::draw_back: counts.moved += draw_back(v); break;
+            case Move::untangle_most: counts.moved += untangle_most(v); break;
             case Move::laplacian: counts.moved += place(v, reached(v, star.centre, -INFINITY)); break;
         }
     }

@@ -256,7 +256,8 @@ struct SurfaceRelocation {
             case Move::mean_ratio: return smooth_mean(v);
             case Move::raise_smallest: return raise_smallest(v);
             case Move::draw_back: return draw_back(v);
-            case Move::come_back: return false;
+            case Move::come_back:
+            case Move::untangle_most: return false;
         }
         return false;
     }

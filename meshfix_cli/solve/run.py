@@ -52,6 +52,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LET_DOWN = 0.8  # of the smallest angle of a surface, to which the first of these may take it
 SURFACE_SWEEPS = 20  # for the mean ratios, where a plane or solid mesh has one energy of all elements
+CORNER_KEPT = 0.3  # of the smallest corner that untangling left: scaled Jacobians do not mind edges that shrink to nothing
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
 
 
@@ -147,6 +148,7 @@ class Run(Positions):
             tangled = self.surface is None or self.first[1].inverted > 0
             return self.left == 0 and tangled and self.freedom is not None and self.freedom.shapes is not None
         if phase.smooths:
+            self._hold_corners()
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
                 return False
             return self._goes_on(phase)
@@ -161,6 +163,12 @@ class Run(Positions):
             return False
         self.near = near & self.inside if phase.slides is False else near
         return True
+
+    def _hold_corners(self) -> None:
+        """Let smoothing make no corner much smaller than the smallest that untangling left."""
+        by_jacobians = self.surface is None and not self.mendable.simplicial
+        if by_jacobians and self.left == 0 and self.min_measure == -math.inf:
+            self.min_measure = CORNER_KEPT * self.measure
 
     def _asks_for_another_start(self) -> bool:
         """Whether Laplacian sweeps did not do, and the little that they left was not soon mended either."""

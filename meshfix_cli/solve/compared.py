@@ -27,7 +27,7 @@ Figures = tuple[float, ...]
 STEPS = 2.0**32  # of 1: sums of integers do not depend on their order
 HALVINGS = 8  # of the way of what is worse; then it goes all the way back
 RETREATS = 20
-SHRUNK = 5e-4  # of the smallest area or volume at a corner: scaled Jacobians do not mind edges that shrink to nothing
+SHAPE_KEPT = 0.3  # of the smallest shape of the default: scaled Jacobians do not mind edges that shrink to nothing
 KEPT = 0.9  # of the first percentile of the default: what others gain may cost it so much
 STALL = 0.01  # of the score: candidates that gain no more in their last turns are the last of their kind
 MEAN = 5.0  # what the mean counts, and the smallest 1: it is that of all elements, and seldom gains much
@@ -50,8 +50,8 @@ class Compared:
         self.best = np.empty(0)
         self.rises: list[float] = []
         self._last = self._values = np.empty(0)
-        self._least: Figures = (-math.inf,) * 5
-        self._score = self._least_measure = -math.inf
+        self._least: Figures = (-math.inf,) * 6
+        self._score = -math.inf
 
     def add(self, points: Array, vertices_of: Callable[[Mask], Mask]) -> Array:
         """Compare one more; return its points with what is too low drawn back to the last.
@@ -66,13 +66,11 @@ class Compared:
         if not self._will_do(figures):
             points = self._drawn_back(points, figures, vertices_of)
             values, figures = self._judged(points)
-        measure = self._team.least(self._elements.check(points, self._threads)[1])
-        if not self._will_do(figures) or measure < self._least_measure:
+        if not self._will_do(figures):
             self.rises.append(0.0)
             return self._last
         if not self.rises:
-            self._least = (*figures[:4], KEPT * figures[4])
-            self._least_measure = SHRUNK * measure
+            self._least = (*figures[:4], KEPT * figures[4], SHAPE_KEPT * figures[5])
         self._last, self._values = points, values
         score = figures[0] + MEAN * figures[2]
         self.rises.append(score - self._score)
@@ -109,6 +107,7 @@ class Compared:
             verdicts, _, qualities = self._elements.judge(points, self._threads)
             worse = (verdicts != 0) | (kernels.sin(qualities) < self._least[1] - SAME)
             worse |= self._jacobians(points) < least - SAME
+            worse |= self._of_metric("shape", points) < self._least[5] - SAME
             if not self._team.total(int(worse[self._own].sum())):
                 return points
             share[vertices_of(worse)] *= 0.5
@@ -127,17 +126,22 @@ class Compared:
     def _judged(self, points: Array) -> tuple[Array, Figures]:
         """Return the scaled Jacobians of the elements (m,), and the figures."""
         jacobians = self._jacobians(points)
-        return jacobians, self._figures_of(jacobians, self._elements.angles(points, self._threads))
+        corners = kernels.sin(self._elements.angles(points, self._threads))
+        return jacobians, self._figures_of(jacobians, corners, self._of_metric("shape", points))
 
     def _jacobians(self, points: Array) -> Array:
+        return self._of_metric("scaled_jacobian", points)
+
+    def _of_metric(self, name: str, points: Array) -> Array:
+        """Return the values of a metric (m,)."""
         rows = self._mesh.topology.connectivity.rows
-        values: Array = evaluate("scaled_jacobian", self._mesh.with_vertices(points))[rows][self._elements.rows]
+        values: Array = evaluate(name, self._mesh.with_vertices(points))[rows][self._elements.rows]
         return values
 
-    def _figures_of(self, jacobians: Array, angles: Array) -> Figures:
-        """Return the smallest scaled Jacobian with and without centres, the means of both, and the first percentile."""
-        own, corners = jacobians[self._own], kernels.sin(angles[self._own])
+    def _figures_of(self, jacobians: Array, corners: Array, shapes: Array) -> Figures:
+        """Return the smallest with and without centres, the means of both, the 1st percentile, and the worst shape."""
+        own, corners = jacobians[self._own], corners[self._own]
         count = max(1, self._team.total(len(own)))
         means = [self._team.total(int((one * STEPS).astype("i8").sum())) / STEPS / count for one in (own, corners)]
         least = [self._team.least(float(one.min(initial=1.0))) for one in (own, corners)]
-        return (*least, *means, self._team.ranked(own, 1))
+        return (*least, *means, self._team.ranked(own, 1), self._team.least(float(shapes[self._own].min(initial=1.0))))

@@ -52,7 +52,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LET_DOWN = 0.8  # of the smallest angle of a surface, to which the first of these may take it
 SURFACE_SWEEPS = 20  # for the mean ratios, where a plane or solid mesh has one energy of all elements
-CORNER_KEPT = 0.3  # of the smallest corner that untangling left: scaled Jacobians do not mind edges that shrink to nothing
+CORNER_KEPT = 0.3  # of the smallest that untangling left: scaled Jacobians do not mind edges that shrink to nothing
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
 
 

@@ -9,7 +9,7 @@ from elements import MESHES, tangles
 from meshfix_cli import Mesh, kernels, untangle
 from meshfix_cli.mesh.judged import Judged
 from meshfix_cli.quality.formulas import evaluate
-from meshfix_cli.solve.compared import KEPT, SHRUNK, Compared
+from meshfix_cli.solve.compared import KEPT, SHAPE_KEPT, Compared
 from meshfix_cli.solve.even import ceiling
 from meshfix_cli.solve.shape import SHARP, SHARP_WEIGHT, Goal, shaped
 from meshfix_cli.solve.team import Alone
@@ -24,12 +24,13 @@ def corners(mesh: Mesh) -> np.ndarray:
     return np.sin(Judged(mesh.topology.stars(1)).angles(mesh.along_curve(mesh.points), 1))
 
 
-@pytest.mark.parametrize("name", ["quad plate", "hexes beside tets", "hex plate", "every solid"])
+@pytest.mark.parametrize("name", ["quad plate", "graded hexes", "hexes beside tets", "hex plate", "every solid"])
 def test_no_figure_is_below_the_defaults(name: str) -> None:
     mesh = tangled(name, "P=25 D=2h")
     default, best = untangle(mesh).after, untangle(mesh, smooth="best").after
     assert best.check()[0] == 0
-    assert best.check()[1] >= SHRUNK * default.check()[1]  # edges do not shrink to nothing
+    worst = [evaluate("shape", mesh).min() for mesh in (default, best)]
+    assert worst[1] >= SHAPE_KEPT * worst[0] - 1e-8  # edges do not shrink to nothing
     for before, after in (
         (evaluate("scaled_jacobian", default), evaluate("scaled_jacobian", best)),
         (corners(default), corners(best)),
@@ -40,16 +41,21 @@ def test_no_figure_is_below_the_defaults(name: str) -> None:
     assert np.percentile(figures[1], 1, method="lower") >= KEPT * np.percentile(figures[0], 1, method="lower") - 1e-8
 
 
-def test_what_has_shrunk_to_nothing_is_not_taken() -> None:
-    """Scaled Jacobians are the same at any size, and a file has so many digits."""
-    mesh = Mesh.build(*MESHES["hex plate"]())
+def test_what_has_become_flat_is_not_taken() -> None:
+    """Scaled Jacobians of boxes are 1, however flat they are."""
+    mesh = Mesh.build(*MESHES["hex box"]())
     elements = Judged(mesh.topology.stars(1))
     compared = Compared(mesh, elements, np.ones(len(elements), dtype=bool), Alone(mesh, 1), 1)
     points = mesh.along_curve(mesh.points)
-    compared.add(points, lambda mask: mask)
-    small, tiny = (points * size for size in (0.9, 0.01))
-    assert compared.add(small, lambda mask: mask) is small
-    assert compared.add(tiny, lambda mask: mask) is small
+
+    def vertices_of(mask: np.ndarray) -> np.ndarray:
+        return np.isin(np.arange(len(points)), elements.vertices(mask))
+
+    compared.add(points, vertices_of)
+    low, flat = (points * [1, 1, size] for size in (0.9, 0.01))
+    assert compared.add(low, vertices_of) is low
+    assert evaluate("shape", mesh.with_vertices(flat)).min() < SHAPE_KEPT
+    assert evaluate("shape", mesh.with_vertices(compared.add(flat, vertices_of))).min() >= SHAPE_KEPT
 
 
 def test_the_bits_are_those_of_one_thread() -> None:

@@ -1,7 +1,6 @@
 """Curved elements by their shapes: the smallest scaled Jacobians are raised, step by step.
 
-The energy of coefficients compares those of an element with its size. Where that is what the edges span at the node of
-the smallest scaled Jacobian, the smallest coefficient is about this Jacobian, and rises with it.
+To the energy of coefficients comes one of the scaled Jacobians at the nodes, with a floor a little above the smallest.
 """
 
 from __future__ import annotations
@@ -20,6 +19,10 @@ if TYPE_CHECKING:
 REACHED = 0.25  # share of a gain that is enough
 ITERATIONS, SHRINK = 60, 0.3  # of a minimisation, and of eps from one to the next
 KEPT = 0.2  # relative to the straight element: down to there coefficients may fall
+WELL = 0.98  # a scaled Jacobian from which on none is raised
+LEAST = 0.5  # share of that to which those that are lower are to rise
+TINY = 0.1  # a scaled Jacobian below which a gain is a share of this
+LEAST_EPS = 0.05  # that a region begins with; otherwise what is aimed at
 
 
 class _Effort(NamedTuple):
@@ -27,8 +30,6 @@ class _Effort(NamedTuple):
 
     Attributes
     ----------
-    patience : int
-        How often elements that do not rise are left out, and others raised; 1: these are the last.
     gains : tuple of float
         By which the smallest is to rise, of itself: each for as long as it does.
     rings : tuple of int
@@ -37,13 +38,13 @@ class _Effort(NamedTuple):
         In one region.
     """
 
-    patience: int
     gains: tuple[float, ...]
     rings: tuple[int, ...]
     minimisations: int
 
 
-THOROUGH, QUICK = _Effort(5, (0.5, 0.1, 0.03), (1, 3), 6), _Effort(1, (0.5,), (1,), 2)
+QUICK, THOROUGH = _Effort((0.5, 0.1), (1,), 2), _Effort((0.2, 0.03), (1, 2), 3)
+TURNS = 5  # of the latter: after each, elements that do not rise are left out, and others raised
 
 
 class _Seen(NamedTuple):
@@ -70,36 +71,36 @@ def better_shapes(
         Go on with small gains, in larger regions, and with other elements where some do not rise.
     """
     now, left = _Seen(points, mesh.judge(points, limits.threads)), mesh.with_one(nodes)
-    effort = THOROUGH if thorough else QUICK
+    highest = min(highest, WELL)
 
     def below(gain: float) -> Mask:
         jacobians = now.judged.scaled_jacobians
-        return left & (jacobians < min((1 + gain) * jacobians[left].min(initial=highest), highest))
+        return left & (jacobians < min(_aim(jacobians[left].min(initial=highest), gain), highest))
 
-    for _ in range(effort.patience):
+    for effort in (QUICK, *(THOROUGH,) * TURNS) if thorough else (QUICK,):
         for gain in effort.gains:
             while (low := below(gain)).any() and (found := _raised(mesh, now, limits, low, gain, effort)):
                 now = found
                 yield now.points
         if not low.any():
             return
-        left = left & ~low
+        if effort is THOROUGH:
+            left = left & ~low
 
 
 def _raised(mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, gain: float, effort: _Effort) -> _Seen | None:
     """Return points where the worst of some elements are better, and no other becomes as bad, if they are found."""
-    jacobians, sizes = now.judged.scaled_jacobians, mesh.kernel.sizes(now.points, limits.threads)
-    worst = float(jacobians[low].min())
-    rise = gain * worst
-    sizes = np.maximum(now.judged.smallest / np.maximum(jacobians, worst), KEPT) * sizes
+    worst = float(now.judged.scaled_jacobians[low].min())
+    rise = _aim(worst, gain) - worst
+    sizes = mesh.kernel.sizes(now.points, limits.threads) * np.clip(now.judged.smallest / KEPT, LEAST, 1.0)
     for rings in effort.rings:
         region = limits.free & mesh.near(low, rings)
         energy = limits.energy(mesh, now.points, now.points, sizes, region)
-        eps, best = worst + rise, -1.0
+        eps, best = max(worst + rise, LEAST_EPS), -1.0
         for _ in range(effort.minimisations):
-            energy.minimise(eps, worst + rise, ITERATIONS)
+            energy.minimise(eps, worst + rise, ITERATIONS, KEPT)
             points = energy.points(now.points.shape[1])
-            found = _Seen(points, mesh.judge(points, limits.threads))
+            found = _Seen(points, mesh.judge_again(now.judged, region, points, limits.threads))
             if _is_better(now.judged, found.judged, low, worst + REACHED * rise):
                 return found
             smallest = float(found.judged.scaled_jacobians[low].min())
@@ -107,6 +108,11 @@ def _raised(mesh: Quadratic, now: _Seen, limits: Limits, low: Mask, gain: float,
                 break
             eps, best = eps * SHRINK, smallest
     return None
+
+
+def _aim(worst: float, gain: float) -> float:
+    """Return how far the worst are to rise, at most half of what they can."""
+    return min(worst + gain * max(worst, TINY), (1 + worst) / 2)
 
 
 def _is_better(before: Judgement, after: Judgement, low: Mask, least: float) -> bool:

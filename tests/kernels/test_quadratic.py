@@ -261,6 +261,28 @@ def energy_of(mesh: kernels.QuadraticMesh, points: Array, free: NDArray[np.uint8
     return energy.evaluate(np.zeros(2 * int(free.sum())), 0.3, 0.2, 0.1)[0]
 
 
+@every
+def test_a_ceiling_is_what_free_nodes_cannot_change(random: np.random.Generator, key: str) -> None:
+    """Wherever they go: the scaled Jacobians at nodes that do not change are the ceiling."""
+    mesh, nodes = mesh_of(key), perturbed(random, key, 0.05)
+    free = random.random(len(nodes)) < 0.2
+    free[random.integers(len(nodes))] = True
+    moved = nodes + 0.01 * random.normal(size=nodes.shape) * free[:, None]
+    before, after = (derivatives(key, points, positions(key)) for points in (nodes, moved))
+    stay = np.isclose(before, after, rtol=0, atol=1e-9).all(axis=(1, 2))
+    none = np.zeros(len(nodes), dtype=np.uint8)
+    assert mesh.ceilings(nodes, none, 1)[0] == mesh.judge(nodes, 1)[3][0]
+    found = mesh.ceilings(nodes, free.astype(np.uint8), 1)[0]
+    values = [mesh.judge(points, 1)[3][0] for points in (nodes, moved)]
+    if not stay.any():
+        assert found == np.inf
+    else:
+        assert found >= max(values) - 1e-9
+        at = before[stay]
+        lowest = min(smooth_jacobian(key, one) for one in at)  # no larger than the scaled Jacobian, by little
+        assert lowest - 1e-9 <= found <= 1.2 * lowest
+
+
 def test_some_elements_are_judged_as_all_are(random: np.random.Generator) -> None:
     rows = np.arange(100 * 10).reshape(100, 10)
     points = np.concatenate([perturbed(random, "tetra10", 0.05) for _ in rows])

@@ -76,6 +76,22 @@ auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int
 }
 
 // The smallest coefficient of each element, relative to sizes, of those that depend on a free node or of those that do not.
+// The smallest scaled Jacobian at nodes where it depends on no free node: infinite where there are none.
+auto ceilings_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const std::uint8_t>& free, int threads) {
+    std::vector<double> ceilings(self.size());
+    with_room(self, points.shape(1), [&](auto dimension, auto room) {
+        constexpr int D = dimension;
+        using R = decltype(room);
+        for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t e = begin; e < end; ++e) {
+                const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
+                ceilings[e] = scaled_jacobian(parts, self.marked(free.data(), e));
+            }
+        });
+    });
+    return to_numpy(std::move(ceilings));
+}
+
 auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
                  const Vector<const std::uint8_t>& free, bool of_free, int threads) {
     std::vector<double> smallest(self.size(), INFINITY);
@@ -206,6 +222,7 @@ void bind_quadratic(nb::module_& m) {
         .def("coefficients", &coefficients_py, "points"_a.noconvert())
         .def("columns", &columns_py, "points"_a.noconvert(), "shares"_a.noconvert())
         .def("judge", &judge_py, "points"_a.noconvert(), "threads"_a, "elements"_a = nb::none())
+        .def("ceilings", &ceilings_py, "points"_a.noconvert(), "free"_a.noconvert(), "threads"_a)
         .def("sizes", &sizes_py, "points"_a.noconvert(), "threads"_a)
         .def("smallest", &smallest_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "of_free"_a, "threads"_a)
         .def("relocate", &relocate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "nodes"_a.noconvert(),

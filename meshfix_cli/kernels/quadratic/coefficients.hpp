@@ -311,11 +311,12 @@ double longest_edges2(const QuadraticType& type, const Edges<D>& derivatives) {
     return product2;
 }
 
-// The smallest scaled Jacobian at the nodes; 0 where a derivative is none.
+// The smallest scaled Jacobian at the nodes, but those where it depends on a free node; 0 where a derivative is none.
 template <int D, class R>
-double scaled_jacobian(const QuadraticParts<D, R>& parts) {
+double scaled_jacobian(const QuadraticParts<D, R>& parts, const NodeSet& free = {}) {
     double smallest = INFINITY;
     for (int node = 0; node < parts.type->nodes; ++node) {
+        if ((parts.type->node_depends[node] & free).any()) continue;
         const Edges<D> e = parts.at_node(node);
         const double product2 = longest_edges2<D>(*parts.type, e);
         smallest = std::min(smallest, product2 > 0.0 ? determinant(e) / std::sqrt(product2) : 0.0);

@@ -35,7 +35,7 @@ class QuadraticMesh:
     ) -> tuple[Uint8, Float64, Float64, Float64]:
         """Verdicts, smallest relative coefficients, measures and scaled Jacobians of all elements or some of them."""
     def ceilings(self, points: Float64, free: Uint8, threads: int) -> Float64:
-        """The smallest scaled Jacobian (m,) at nodes where it depends on no free node; infinite where it always does."""
+        """The smallest scaled Jacobian (m,) at nodes where it depends on no free node; infinite where none is so."""
     def sizes(self, points: Float64, threads: int) -> Float64:
         """det J (m,) of the straight elements, in the mean, which coefficients are compared with."""
     def smallest(self, points: Float64, sizes: Float64, free: Uint8, of_free: bool, threads: int) -> Float64:

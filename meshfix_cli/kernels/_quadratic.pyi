@@ -30,8 +30,12 @@ class QuadraticMesh:
         """Bezier coefficients of det J of the first element."""
     def columns(self, points: Float64, shares: Float64) -> Float64:
         """Gradients (k, d) of these by x, where each node moves by its share of x; they are affine in it."""
-    def judge(self, points: Float64, threads: int) -> tuple[Uint8, Float64, Float64, Float64]:
-        """Verdicts, smallest relative coefficients, measures and scaled Jacobians, each (m,)."""
+    def judge(
+        self, points: Float64, threads: int, elements: Int32 | None = None
+    ) -> tuple[Uint8, Float64, Float64, Float64]:
+        """Verdicts, smallest relative coefficients, measures and scaled Jacobians of all elements or some of them."""
+    def ceilings(self, points: Float64, free: Uint8, threads: int) -> Float64:
+        """The smallest scaled Jacobian (m,) at nodes where it depends on no free node; infinite where none is so."""
     def sizes(self, points: Float64, threads: int) -> Float64:
         """det J (m,) of the straight elements, in the mean, which coefficients are compared with."""
     def smallest(self, points: Float64, sizes: Float64, free: Uint8, of_free: bool, threads: int) -> Float64:
@@ -74,12 +78,17 @@ class QuadraticEnergy:
         threads: int,
     ) -> None:
         """Take positions (n, d), those whose corners make the straight elements at rest, and det J of these (m,)."""
-    def minimise(self, eps: float, floor: float, iterations: int) -> tuple[float, float, float]:
+    def minimise(
+        self, eps: float, floor: float, iterations: int, kept: float | None = None
+    ) -> tuple[float, float, float]:
         """Go on from where the last one ended, until all coefficients are above the floor.
 
-        Returns the energy before and after, and the smallest coefficient, relative to the sizes.
+        With `kept` that is the floor of the scaled Jacobians at nodes, and this one that of the coefficients. Returns
+        the energy before and after, and the smallest of what the floor is of, coefficients relative to the sizes.
         """
-    def evaluate(self, variables: Float64, eps: float, floor: float) -> tuple[float, Float64]:
+    def evaluate(
+        self, variables: Float64, eps: float, floor: float, kept: float | None = None
+    ) -> tuple[float, Float64]:
         """Return the value and its gradient at steps of the free nodes, each in its own unit."""
     def points(self, dimension: int) -> Float64:
         """Return the points (n, d)."""

@@ -123,6 +123,7 @@ class Quadratic:
         self.ties = ties or ties_of(list(zip(elements, (nodes for _, nodes in blocks), strict=True)), n)[0]
         self.free = self.used & ~self.corners
         self.giving = np.zeros(n, dtype=bool)
+        self._judged: tuple[Array, Judgement] | None = None
         self.kernel = kernels.QuadraticMesh(self.codes, self.nodes, n, [_type_of(element) for element in others])
 
     def holding(self, held: Mask, giving: Mask) -> Quadratic:
@@ -148,8 +149,19 @@ class Quadratic:
         return found
 
     def judge(self, points: Array, threads: int) -> Judgement:
-        """Look at all elements at positions (n, d) of all points."""
-        return Judgement(*self.kernel.judge(points, threads))
+        """Look at all elements at positions (n, d) of all points; not once more at the last that were judged."""
+        if self._judged is None or not np.array_equal(self._judged[0], points):
+            self._judged = points.copy(), Judgement(*self.kernel.judge(points, threads))
+        return self._judged[1]
+
+    def judge_again(self, before: Judgement, nodes: Mask, points: Array, threads: int) -> Judgement:
+        """Return what is judged before of positions that have changed at marked nodes (n,) alone."""
+        elements = np.flatnonzero(self.with_one(nodes)).astype(np.int32)
+        verdicts, smallest = before.verdicts.copy(), before.smallest.copy()
+        measures, jacobians = before.measures.copy(), before.scaled_jacobians.copy()
+        some = self.kernel.judge(points, threads, elements)
+        verdicts[elements], smallest[elements], measures[elements], jacobians[elements] = some
+        return Judgement(verdicts, smallest, measures, jacobians)
 
     @cached_property
     def corners(self) -> Mask:

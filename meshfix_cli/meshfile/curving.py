@@ -12,6 +12,7 @@ from meshfix_cli.errors import ReadError, listed
 from meshfix_cli.mesh.elements import ELEMENTS, counted, words
 from meshfix_cli.mesh.mesh import check_coordinates
 from meshfix_cli.mesh.quadratic import Quadratic, is_judged
+from meshfix_cli.mesh.topology import distinct
 from meshfix_cli.meshfile.solved import Part
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ def check_plane(
     ties : Ties
     """
     nodes = np.flatnonzero(ties.nodes)
-    corner = np.unique(np.concatenate([tie.corners.ravel() for tie in ties.groups]))
+    corner = distinct(np.concatenate([tie.corners.ravel() for tie in ties.groups]))
     normal = np.cross(*basis)
     heights = places.astype(np.float64) @ normal
     size = float(np.ptp(points[corner], axis=0).max())
@@ -161,8 +162,8 @@ def _on_facets(mesh: Mesh, ties: Ties, regions: Iterable[NDArray[np.int64] | Non
             continue
         for size in {3, facets.shape[1]}:
             some = facets[(facets >= 0).sum(axis=1) == size][:, :size]
-            for k in range(size):
-                mask[_found(ties, some[:, [k, (k + 1) % size]])] = True
+            edges = np.stack([some, np.roll(some, -1, axis=1)], axis=-1).reshape(-1, 2)
+            mask[_found(ties, edges)] = True
             mask[_found(ties, some)] = True
     return mask
 
@@ -173,7 +174,8 @@ def _found(ties: Ties, corners: NDArray[np.integer]) -> NDArray[np.integer]:
     for tie in ties.groups:
         if tie.corners.shape[1] != corners.shape[1] or not len(corners):
             continue
-        both = np.concatenate([np.sort(corners, axis=1), tie.corners])
-        number = np.unique(both, axis=0, return_inverse=True)[1].reshape(-1)
+        number, *others = np.concatenate([np.sort(corners, axis=1), tie.corners]).T.astype(np.int64)
+        for column in others:
+            number = np.unique(number * (column.max() + 1) + column, return_inverse=True)[1].reshape(-1)
         nodes.append(tie.nodes[np.isin(number[len(corners) :], number[: len(corners)])])
     return np.concatenate(nodes)

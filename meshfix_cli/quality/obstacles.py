@@ -151,9 +151,11 @@ def _of_curved(mesh: Mesh, quadratic: Quadratic, threads: int) -> Obstacles:
     invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
     proofs = proofs_of_curved(quadratic, mesh.points, mesh.movable | quadratic.free, invalid)
     straight = find_obstacles(replace(mesh, quadratic=None), threads)
-    alone, together = quadratic.rows[proofs == 1], np.sort(quadratic.rows[proofs == 2]).astype(np.int32)
-    alone = np.union1d(alone, np.setdiff1d(straight.inverted, quadratic.rows)).astype(np.int32)
-    bent = np.zeros(mesh.topology.m, dtype=bool)
+    curved, bent = np.zeros((2, mesh.topology.m), dtype=bool)
+    curved[quadratic.rows] = True
+    inverted = straight.inverted[~curved[straight.inverted]]
+    alone = distinct(np.concatenate([quadratic.rows[proofs == 1], inverted])).astype(np.int32)
+    together = np.sort(quadratic.rows[proofs == 2]).astype(np.int32)
     bent[quadratic.rows] = quadratic.bent(mesh.points)
     crossing, folding = (pairs[~bent[pairs].any(axis=1)] for pairs in (straight.crossing, straight.folding))
     return Obstacles(alone, together, crossing, folding, straight.overlapping[~bent[straight.overlapping]])

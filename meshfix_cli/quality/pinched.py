@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from meshfix_cli import kernels
 from meshfix_cli.mesh.elements import Element
 from meshfix_cli.mesh.quadratic import Array, Mask, Quadratic
+from meshfix_cli.mesh.topology import distinct
 
 NEWTON = 12  # steps
 BOX = 1e-6  # of the parameters, half the width
@@ -93,7 +94,7 @@ def pinched(mesh: Quadratic, points: Array, free: Mask, asked: Mask) -> Mask:
         The elements that are looked at.
     """
     found = np.zeros(len(mesh), dtype=bool)
-    for code in np.unique(mesh.codes[asked]):
+    for code in distinct(mesh.codes[asked]):
         element = mesh.types[code]
         rows = np.flatnonzero(asked & (mesh.codes == code))
         nodes = mesh.nodes[mesh.offsets[rows][:, None] + np.arange(element.nodes)]

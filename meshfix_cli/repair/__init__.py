@@ -16,7 +16,7 @@ from meshfix_cli.errors import WriteError, listed, naming
 from meshfix_cli.mesh.elements import counted
 from meshfix_cli.solve import strategies
 from meshfix_cli.solve.perturb import Distance
-from meshfix_cli.solve.strategies import SMOOTH, Smooth, plan
+from meshfix_cli.solve.strategies import SMOOTH, THRESHOLD, Smooth, plan
 
 if TYPE_CHECKING:
     import numpy as np
@@ -267,14 +267,15 @@ class Method:
         self, mesh: Mesh, reach: float, threads: int, reference: NDArray[np.float64] | None = None
     ) -> Steps:
         """Run what curved elements need, see `quadratic.curved_steps`."""
-        from meshfix_cli.solve.quadratic import RAISED, curved_steps
+        from meshfix_cli.solve.quadratic import curved_steps
 
         smooth: Smooth = 0 if self.only_invalid or not self.smooth else "best" if self.smooth == "best" else SMOOTH
-        floor = {0: None, "best": 1.0}.get(smooth, RAISED)
+        threshold = THRESHOLD[mesh.dimension] if self.threshold is None else self.threshold
+        highest = {0: None, "best": 1.0}.get(smooth, math.sin(math.radians(threshold)))
         untangling = replace(self, smooth=smooth)
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
         return curved_steps(
-            mesh, straight, floor=floor, relax=self.curving == "relax", max_move=reach, threads=threads,
+            mesh, straight, highest=highest, relax=self.curving == "relax", max_move=reach, threads=threads,
             sweeps=self.sweeps,
         )  # fmt: skip
 

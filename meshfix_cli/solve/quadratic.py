@@ -2,7 +2,8 @@
 
 The linear programme runs on the Bezier coefficients of det J, first of the nodes on edges, faces and inside, then of
 corners, with which the nodes go that lie between them. What it leaves is solved by an energy of all coefficients of a
-region, minimised by L-BFGS; the same energy with a floor raises the smallest coefficients, step by step.
+region, minimised by L-BFGS. Then scaled Jacobians are raised, see `curved_shape.py`, and last, by the same energy with
+a floor, coefficients that are small even so, step by step.
 
 Source: for the linear programme Freitag and Plassmann, as everywhere; for barriers on Bezier coefficients T. Toulorge,
 C. Geuzaine, J.-F. Remacle, J. Lambrechts, "Robust untangling of curvilinear meshes", Journal of Computational Physics
@@ -37,8 +38,7 @@ RINGS = (1, 2, 4)  # around invalid elements, in which the energy is minimised
 MINIMISATIONS, ITERATIONS = 14, 100  # in one region, and of one of them
 MINIMISATIONS_OF_HOPELESS = 4
 SHRINK = 0.4  # of eps from one minimisation to the next
-POOR, RAISED = 0.2, 0.5  # what is below the first is raised, by default as far as the second
-POOR_JACOBIAN = 0.2  # scaled, at nodes
+POOR, RAISED = 0.2, 0.5  # coefficients below the first are raised, as far as the second
 STEP, LEAST_STEP, NEARLY = 0.1, 0.02, 0.999  # of the floor; the last is this share of the highest
 RAISING_RINGS = (1, 3)
 RAISING_MINIMISATIONS, RAISING_ITERATIONS, RAISING_EPS, RAISING_SHRINK = 8, 60, 0.3, 0.3
@@ -56,7 +56,7 @@ Steps = Iterator[tuple["Mesh", SweepRecord]]
 
 
 def steps(
-    mesh: Quadratic, points: Array, limits: Limits, floor: float | None = RAISED, budget: Budget | None = None
+    mesh: Quadratic, points: Array, limits: Limits, highest: float | None, budget: Budget | None = None
 ) -> Iterator[Step]:
     """Yield what is done and the points (n, d) after it; the last are never worse than the first.
 
@@ -65,42 +65,20 @@ def steps(
     mesh : Quadratic
     points : (n, d) float64
     limits : Limits
-    floor : float or None
-        How far coefficients are raised, relative to the straight element, where one is below `POOR`, and in any case if
-        this is 1; None: no farther than validity takes.
+    highest : float or None
+        How far scaled Jacobians are raised, see `better_shapes`; 1: as far as can be; None: no farther than validity
+        takes.
     budget : Budget, optional
         Of what untangles.
     """
     run = _Run(mesh, points, limits, budget)
     yield from run.untangle()
-    if floor is None or run.left:
+    if highest is None or run.left:
         return
-    if floor == 1:
-        yield from _as_good_as_can_be(run)
-        return
-    if run.now.smallest < POOR:
-        yield from run.raise_to(floor)
-    moved = run.free & (run.points != points).any(axis=1)
-    for better in better_shapes(mesh, run.points, limits, moved, POOR_JACOBIAN, thorough=False):
+    for better in better_shapes(mesh, run.points, limits, run.free, highest, thorough=highest == 1):
+        run.take(better)
         yield RAISING, better
-
-
-def _as_good_as_can_be(run: _Run) -> Iterator[Step]:
-    """Raise coefficients and then scaled Jacobians, or these alone, if that makes the worst better."""
-
-    def shapes(start: Array) -> list[Array]:
-        return [start, *better_shapes(run.mesh, start, run.limits, run.free, 1.0, thorough=True)]
-
-    def worst(points: Array) -> float:
-        return float(run.mesh.judge(points, run.limits.threads).scaled_jacobians[of_free].min(initial=1.0))
-
-    of_free, alone = run.mesh.with_one(run.free), shapes(run.points)[-1]
-    yield from run.raise_to(1.0)
-    found = shapes(run.points)
-    if worst(alone) > worst(found[-1]):
-        found.append(alone)
-    for better in found[1:]:
-        yield RAISING, better
+    yield from run.raise_coefficients()
 
 
 class _Seen(NamedTuple):
@@ -204,23 +182,30 @@ class _Run:
                 return
             eps *= SHRINK
 
-    def raise_to(self, highest: float) -> Iterator[Step]:
-        """Raise the smallest coefficients, those of nodes first; elements that held nodes keep low are left out."""
-        sizes = self.mesh.kernel.sizes(self.points, self.limits.threads)
-        for free in (self.free & ~self.mesh.corners, self.free):
-            if free is self.free and self.now.smallest >= POOR and highest != 1:
-                return
-            if (yield from self._raise(free, highest, sizes)):
-                yield from self._raise(free, highest, sizes, patient=True)
+    def take(self, points: Array) -> None:
+        """Go on from points."""
+        self.now, self.sizes = self._seen(points), self.mesh.kernel.sizes(points, self.limits.threads)
 
-    def _raise(self, free: Mask, highest: float, sizes: Array, patient: bool = False) -> Generator[Step, None, bool]:
+    def raise_coefficients(self) -> Iterator[Step]:
+        """Raise coefficients that are smaller than shapes tell, where held nodes do not keep them, by nodes first."""
+        of_free, of_held = (self._smallest(self.points, self.free, of_free) for of_free in (True, False))
+        if not ((of_free < np.minimum(self.now.jacobians, POOR)) & (of_held >= POOR)).any():
+            return
+        sizes = self.sizes
+        for free in (self.free & ~self.mesh.corners, self.free):
+            if free is self.free and self.now.smallest >= POOR:
+                return
+            if (yield from self._raise(free, sizes)):
+                yield from self._raise(free, sizes, patient=True)
+
+    def _raise(self, free: Mask, sizes: Array, patient: bool = False) -> Generator[Step, None, bool]:
         """Raise coefficients step by step, relative to sizes (m,) at least; return whether any cost too much.
 
-        Patient: that is not taken, but gone on from.
+        Elements that held nodes keep low are left out. Patient: what costs too much is not taken, but gone on from.
         """
         step, floor, kept, quality, refused = STEP, STEP, self.now, self._quality(self.now), False
-        while floor < highest and step >= LEAST_STEP:
-            floor = min(floor, NEARLY * highest)
+        while floor < RAISED and step >= LEAST_STEP:
+            floor = min(floor, NEARLY * RAISED)
             straight = self.mesh.kernel.sizes(self.points, self.limits.threads)
             self.rest, self.sizes = self.points, np.maximum(straight, sizes)
             stuck = self._smallest(self.points, free, of_free=False) <= floor
@@ -234,7 +219,7 @@ class _Run:
                 if found is None and (region != smaller).any():
                     found = self._above(region, floor)
             reached = quality if found is None or found is kept else self._quality(found)
-            costly = _costs_too_much(quality, reached, floor)
+            costly = _costs_too_much(quality, reached)
             refused |= costly
             if found is None or (costly and not patient):
                 step /= 2
@@ -272,18 +257,13 @@ class _Run:
         return None
 
 
-def _costs_too_much(before: Array, after: Array, floor: float) -> bool:
-    """Whether the worst quality (m,) of the elements that change falls, or above `RAISED` the sum of that of poor ones.
+def _costs_too_much(before: Array, after: Array) -> bool:
+    """Whether the worst quality (m,) of the elements that change falls.
 
     Relative to the straight element coefficients rise as well where that becomes thin.
     """
     changed = after != before
-    before, after = before[changed], after[changed]
-    if floor > RAISED:
-        before, after = np.minimum(before, POOR_JACOBIAN), np.minimum(after, POOR_JACOBIAN)
-        if after.sum() < before.sum():
-            return True
-    return bool(after.min(initial=math.inf) < before.min(initial=math.inf))
+    return bool(after[changed].min(initial=math.inf) < before[changed].min(initial=math.inf))
 
 
 def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array | None:
@@ -339,7 +319,7 @@ def curved_steps(
     mesh: Mesh,
     straight: Callable[[Mesh], Steps],
     *,
-    floor: float | None,
+    highest: float | None,
     relax: bool,
     max_move: float,
     threads: int,
@@ -356,7 +336,7 @@ def curved_steps(
         With its `quadratic` elements.
     straight : callable
         Untangles the straight elements, in as many sweeps as are allowed, and smooths them.
-    floor : float or None
+    highest : float or None
         See `steps`.
     relax : bool
         Let held nodes of the boundary give way where nothing else helps, see `relaxed`.
@@ -374,7 +354,7 @@ def curved_steps(
     best, found = mesh, [mesh]
     invalid = quadratic.judge(mesh.points, threads).verdicts != VALID
     hopeless = proofs_of_curved(quadratic, mesh.points, limits.free, invalid) == 1
-    if floor == 1 or _is_tangled(mesh, threads):
+    if highest == 1 or _is_tangled(mesh, threads):
         for moved, record in straight(replace(mesh, quadratic=None)):
             followed = quadratic.follow(mesh.points, moved.points)
             best = replace(moved, quadratic=quadratic).with_points(followed)
@@ -382,13 +362,13 @@ def curved_steps(
                 budget.left -= not record.phase.startswith(SMOOTHING)
                 yield best, replace(record, phase=f"straight elements, {record.phase}")
         clock.points = best.points
-    enough = (best.points == mesh.points).all() or (floor != 1 and best.check(threads)[0] < first.inverted)
+    enough = (best.points == mesh.points).all() or (highest != 1 and best.check(threads)[0] < first.inverted)
     for start in [best] if enough else [best, mesh]:
         best = start
-        for name, best in _mended(start, hopeless, limits, floor, budget):
+        for name, best in _mended(start, hopeless, limits, highest, budget):
             yield best, clock.record(name, best)
         found.append(best)
-        if floor == 1:
+        if highest == 1:
             continue
         left = best.judge_curved(threads)[0]
         if not left.any():
@@ -403,7 +383,7 @@ def curved_steps(
         if given is not None:
             best = best.with_points(given)
             yield best, clock.record(RELAXING, best)
-            for name, points in steps(quadratic, given, limits, floor, budget):
+            for name, points in steps(quadratic, given, limits, highest, budget):
                 best = best.with_points(points)
                 yield best, clock.record(name, best)
     if clock.points is not best.points:
@@ -411,7 +391,7 @@ def curved_steps(
 
 
 def _mended(
-    mesh: Mesh, hopeless: Mask, limits: Limits, floor: float | None, budget: Budget
+    mesh: Mesh, hopeless: Mask, limits: Limits, highest: float | None, budget: Budget
 ) -> Iterator[tuple[str, Mesh]]:
     """Yield what is done to curved elements but hopeless ones (k,), and the mesh after it; see `steps`.
 
@@ -421,7 +401,7 @@ def _mended(
     assert quadratic is not None
     if not hopeless.all():
         others = quadratic.part(~hopeless) if hopeless.any() else quadratic
-        for name, points in steps(others, mesh.points, limits, None if hopeless.any() else floor, budget):
+        for name, points in steps(others, mesh.points, limits, None if hopeless.any() else highest, budget):
             mesh = mesh.with_points(points)
             yield name, mesh
     if hopeless.any():  # what is best for others alone may have been bad for these

@@ -196,37 +196,6 @@ def test_verdicts_do_not_depend_on_where_and_how_large(random: np.random.Generat
 
 
 @every
-def test_the_gradient_of_the_energy(random: np.random.Generator, key: str) -> None:
-    mesh, nodes = mesh_of(key), perturbed(random, key, 0.1)
-    rest = perturbed(random, key, 0.02)
-    free = np.ones(len(nodes), dtype=np.uint8)
-    free[[0, -1]] = 0
-    for reach in (ANYWHERE, 0.4):
-        energy = kernels.QuadraticEnergy(mesh, nodes, rest, mesh.sizes(rest, 1), free, nodes + 0.01, reach, 1)
-        at = 0.05 * random.normal(size=(len(nodes) - 2) * nodes.shape[1])
-        _, gradient = energy.evaluate(at, 0.3, 0.1)
-        h = 1e-6
-        steps = h * np.eye(len(at))
-        slopes = [
-            (energy.evaluate(at + s, 0.3, 0.1)[0] - energy.evaluate(at - s, 0.3, 0.1)[0]) / (2 * h) for s in steps
-        ]
-        np.testing.assert_allclose(gradient, slopes, atol=1e-6 * np.abs(gradient).max())
-
-
-def test_the_energy_has_the_same_bits_for_any_number_of_threads(random: np.random.Generator) -> None:
-    rows = np.arange(200 * 10, dtype=np.int32).reshape(200, 10)
-    rows[1:, 0] = rows[:-1, 1]  # a chain of elements, each from a node of the one before
-    points = np.concatenate([perturbed(random, "tetra10", 0.05) for _ in rows])
-    mesh = kernels.QuadraticMesh(np.full(200, CODES["tetra10"], dtype=np.uint8), rows.ravel(), len(points))
-    sizes, free = np.ones(200), (random.random(len(points)) < 0.7).astype(np.uint8)
-    found = []
-    for threads in (1, 2, 3):
-        energy = kernels.QuadraticEnergy(mesh, points, points, sizes, free, points, ANYWHERE, threads)
-        found.append((energy.minimise(0.5, 0.0, 20), energy.points(3).tobytes()))
-    assert found[0] == found[1] == found[2]
-
-
-@every
 def test_the_programme_of_a_node_against_highs(random: np.random.Generator, key: str) -> None:
     """One sweep over one node: the smallest coefficient is that of the best position, as HiGHS finds it."""
     mesh, node = mesh_of(key), type_of(key).nodes - 1

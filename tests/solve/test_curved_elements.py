@@ -22,8 +22,8 @@ from meshfix_cli.solve.quadratic import PARTS, POOR, relaxed, steps
 every = pytest.mark.parametrize("key", list(FAMILIES))
 
 
-def repaired(quadratic: Quadratic, points: Array, limits: Limits, floor: float | None = 0.5) -> Array:
-    found = [moved for _, moved in steps(quadratic, points, limits, floor)]
+def repaired(quadratic: Quadratic, points: Array, limits: Limits, highest: float | None = 0.26) -> Array:
+    found = [moved for _, moved in steps(quadratic, points, limits, highest)]
     return found[-1] if found else points
 
 
@@ -58,7 +58,8 @@ def test_no_node_goes_farther_than_it_may() -> None:
 def test_what_is_well_is_left_alone() -> None:
     quadratic, points, free = curved("hexahedron20", 0.1)
     assert quadratic.judge(points, 1).smallest.min() > POOR
-    assert list(steps(quadratic, points, Limits(free, points))) == []
+    well = float(quadratic.judge(points, 1).scaled_jacobians.min())
+    assert list(steps(quadratic, points, Limits(free, points), well)) == []
 
 
 def test_the_result_turns_with_the_mesh() -> None:

@@ -90,6 +90,22 @@ def test_an_element_that_is_held_does_not_keep_others_from_their_best() -> None:
     assert after.mean() > before.mean()
 
 
+def test_by_default_the_worst_rise_as_far_as_the_threshold_or_held_nodes_let_them() -> None:
+    quadratic, points, free = curved("triangle6", 0.1)
+    limits, some = Limits(free, points), quadratic.with_one(free)
+    found = [points, *better_shapes(quadratic, points, limits, free, 0.5, thorough=False)]
+    assert quadratic.judge(found[-1], 1).scaled_jacobians[some].min() >= 0.5
+    low = int(np.flatnonzero(some & ~quadratic.with_one(~free))[0])  # of one that is free all edges become held
+    rows = straight("triangle6")[1]
+    free[rows[low, 3:5]] = False
+    free[rows[low, :3]] = False
+    points[rows[low, 3]] += 0.3 * (points[rows[low, 2]] - points[rows[low, 3]])
+    assert quadratic.judge(points, 1).verdicts[low] == VALID
+    held = quadratic.kernel.ceilings(points, free.astype(np.uint8), 1)
+    found = [points, *better_shapes(quadratic, points, Limits(free, points), free, 1.0, thorough=False)]
+    assert quadratic.judge(found[-1], 1).scaled_jacobians[low] == pytest.approx(held[low], rel=1e-6)
+
+
 def test_the_best_of_what_is_valid_moves_nothing_where_only_what_is_invalid_may_move() -> None:
     quadratic, points, free = curved("triangle6", 0.1)
     mesh = mesh_of(quadratic, points, "triangle6", straight("triangle6")[1], free)

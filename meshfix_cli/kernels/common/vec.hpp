@@ -40,6 +40,11 @@ inline std::array<T, D> operator*(T s, const std::array<T, D>& a) {
     return c;
 }
 
+template <std::size_t D>
+inline std::array<Pack, D> operator*(double s, const std::array<Pack, D>& a) {
+    return constant<Pack>(s) * a;
+}
+
 template <class T, std::size_t D>
 inline T dot(const std::array<T, D>& a, const std::array<T, D>& b) {
     T s = a[0] * b[0];

@@ -1,4 +1,8 @@
 // Bindings of what is known of curved elements.
+#include <nanobind/stl/optional.h>
+
+#include <numeric>
+#include <optional>
 #include <variant>
 
 #include "arrays.hpp"
@@ -44,10 +48,16 @@ void init_mesh(QuadraticMesh* self, const Vector<const std::uint8_t>& codes, con
                              static_cast<std::int64_t>(nodes.shape(0)), n, types);
 }
 
-auto judge_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
+auto judge_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads,
+              const std::optional<Vector<const std::int32_t>>& some) {
+    std::vector<std::int32_t> elements(some ? some->shape(0) : self.size());
+    if (some)
+        std::copy_n(some->data(), elements.size(), elements.begin());
+    else
+        std::iota(elements.begin(), elements.end(), 0);
     QuadraticJudgement found = with_room(self, points.shape(1), [&](auto dimension, auto room) {
         constexpr int D = dimension;
-        return judge<D, decltype(room)>(self, points.data(), threads);
+        return judge<D, decltype(room)>(self, points.data(), elements, threads);
     });
     return std::make_tuple(to_numpy(std::move(found.verdict)), to_numpy(std::move(found.smallest)),
                            to_numpy(std::move(found.measure)), to_numpy(std::move(found.quality)));
@@ -66,6 +76,22 @@ auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int
 }
 
 // The smallest coefficient of each element, relative to sizes, of those that depend on a free node or of those that do not.
+// The smallest scaled Jacobian at nodes where it depends on no free node: infinite where there are none.
+auto ceilings_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const std::uint8_t>& free, int threads) {
+    std::vector<double> ceilings(self.size());
+    with_room(self, points.shape(1), [&](auto dimension, auto room) {
+        constexpr int D = dimension;
+        using R = decltype(room);
+        for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+            for (std::int64_t e = begin; e < end; ++e) {
+                const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
+                ceilings[e] = scaled_jacobian(parts, self.marked(free.data(), e));
+            }
+        });
+    });
+    return to_numpy(std::move(ceilings));
+}
+
 auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
                  const Vector<const std::uint8_t>& free, bool of_free, int threads) {
     std::vector<double> smallest(self.size(), INFINITY);
@@ -158,10 +184,10 @@ void init_energy(PyQuadraticEnergy* self, const QuadraticMesh& mesh, const Matri
     }));
 }
 
-auto minimise_py(PyQuadraticEnergy& self, double eps, double floor, int iterations) {
+auto minimise_py(PyQuadraticEnergy& self, double eps, double floor, int iterations, std::optional<double> kept) {
     const nb::gil_scoped_release release;
     return std::visit([&](auto& lbfgs) {
-        lbfgs.function().goal = {eps, floor};
+        lbfgs.function().goal = {eps, floor, kept};
         const double before = lbfgs.start(), after = lbfgs.minimise(iterations);
         return std::make_tuple(before, after, lbfgs.function().smallest());
     }, self.minimiser);
@@ -172,12 +198,12 @@ auto points_py(PyQuadraticEnergy& self, std::size_t dimension) {
 }
 
 // The energy and its gradient at displacements of the free nodes, each in its own unit.
-auto evaluate_py(PyQuadraticEnergy& self, const Vector<const double>& variables, double eps, double floor) {
+auto evaluate_py(PyQuadraticEnergy& self, const Vector<const double>& variables, double eps, double floor, std::optional<double> kept) {
     std::vector<double> gradient(variables.shape(0));
     const double value = std::visit([&](auto& lbfgs) {
         auto& energy = lbfgs.function();
         if (static_cast<std::int64_t>(variables.shape(0)) != energy.size()) throw nb::value_error("the variables are of another mesh");
-        energy.goal = {eps, floor};
+        energy.goal = {eps, floor, kept};
         return energy(variables.data(), gradient.data());
     }, self.minimiser);
     return std::make_pair(value, to_numpy(std::move(gradient)));
@@ -195,7 +221,8 @@ void bind_quadratic(nb::module_& m) {
              nb::keep_alive<1, 5>())
         .def("coefficients", &coefficients_py, "points"_a.noconvert())
         .def("columns", &columns_py, "points"_a.noconvert(), "shares"_a.noconvert())
-        .def("judge", &judge_py, "points"_a.noconvert(), "threads"_a)
+        .def("judge", &judge_py, "points"_a.noconvert(), "threads"_a, "elements"_a = nb::none())
+        .def("ceilings", &ceilings_py, "points"_a.noconvert(), "free"_a.noconvert(), "threads"_a)
         .def("sizes", &sizes_py, "points"_a.noconvert(), "threads"_a)
         .def("smallest", &smallest_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "of_free"_a, "threads"_a)
         .def("relocate", &relocate_py, "points"_a.noconvert(), "sizes"_a.noconvert(), "free"_a.noconvert(), "nodes"_a.noconvert(),
@@ -204,8 +231,8 @@ void bind_quadratic(nb::module_& m) {
     nb::class_<PyQuadraticEnergy>(m, "QuadraticEnergy")
         .def("__init__", &init_energy, "mesh"_a, "points"_a.noconvert(), "rest"_a.noconvert(), "sizes"_a.noconvert(),
              "free"_a.noconvert(), "start"_a.noconvert(), "reach"_a, "threads"_a, nb::keep_alive<1, 2>())
-        .def("minimise", &minimise_py, "eps"_a, "floor"_a, "iterations"_a)
-        .def("evaluate", &evaluate_py, "variables"_a.noconvert(), "eps"_a, "floor"_a)
+        .def("minimise", &minimise_py, "eps"_a, "floor"_a, "iterations"_a, "kept"_a = nb::none())
+        .def("evaluate", &evaluate_py, "variables"_a.noconvert(), "eps"_a, "floor"_a, "kept"_a = nb::none())
         .def("points", &points_py, "dimension"_a);
 }
 

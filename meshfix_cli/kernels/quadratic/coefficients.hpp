@@ -13,8 +13,11 @@
 
 namespace meshfix {
 
-template <int D, class R>
-using QuadraticNodes = std::array<Vec<D>, R::NODES>;
+// The scalar T is double, or Pack: elements of one type side by side.
+template <int D, class R, class T = double>
+using QuadraticNodes = std::array<Vec<D, T>, R::NODES>;
+template <int D, class R, class T = double>
+using QuadraticDifferences = std::array<std::array<Vec<D, T>, R::DIFFERENCES>, 3>;
 
 // Sets as many of the values to zero as are needed.
 template <class T, std::size_t N>
@@ -22,15 +25,15 @@ void clear(std::array<T, N>& values, int count) {
     std::fill_n(values.begin(), count, T{});
 }
 
-template <int D, class R>
+template <int D, class R, class T = double>
 struct QuadraticParts {
     const QuadraticType* type;
-    QuadraticNodes<D, R> control;
-    std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> difference;
-    std::array<Vec<D>, R::NORMALS> normal;  // 3-D
-    std::array<double, R::COEFFICIENTS> coefficient;
+    QuadraticNodes<D, R, T> control;
+    QuadraticDifferences<D, R, T> difference;
+    std::array<Vec<D, T>, R::NORMALS> normal;  // 3-D
+    std::array<T, R::COEFFICIENTS> coefficient;
 
-    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D, R>& nodes) : type(&of) {
+    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D, R, T>& nodes) : type(&of) {
         for (int c = 0; c < of.controls; ++c) control[c] = weighted(of.control_of_nodes[c], nodes);
         find();
     }
@@ -60,28 +63,28 @@ struct QuadraticParts {
     }
 
     // The derivatives along all directions at a node.
-    Edges<D> at_node(int node) const {
-        Edges<D> e;
+    Edges<D, T> at_node(int node) const {
+        Edges<D, T> e;
         for (int j = 0; j < D; ++j) e[j] = weighted(type->at_node[node][j], difference[j]);
         return e;
     }
 
     // The derivative by the nodes of a function whose derivatives by the coefficients are given.
-    QuadraticNodes<D, R> slopes(const std::array<double, R::COEFFICIENTS>& by_coefficient) const {
-        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> by_difference;
+    QuadraticNodes<D, R, T> slopes(const std::array<T, R::COEFFICIENTS>& by_coefficient) const {
+        QuadraticDifferences<D, R, T> by_difference;
         for (int j = 0; j < D; ++j) clear(by_difference[j], size(j));
-        std::array<double, R::COEFFICIENTS> g;
-        for (int i = 0; i < type->coefficients; ++i) g[i] = by_coefficient[i] * type->unscaled[i];
+        std::array<T, R::COEFFICIENTS> g;
+        for (int i = 0; i < type->coefficients; ++i) g[i] = type->unscaled[i] * by_coefficient[i];
         pull_back(g.data(), by_difference);
-        QuadraticNodes<D, R> found;
+        QuadraticNodes<D, R, T> found;
         clear(found, type->nodes);
         add_to_nodes(by_difference, found);
         return found;
     }
 
     // Adds to the slopes of nodes what the slopes by differences make of them.
-    void add_to_nodes(const std::array<std::array<Vec<D>, R::DIFFERENCES>, 3>& by_difference, QuadraticNodes<D, R>& found) const {
-        QuadraticNodes<D, R> by_control;
+    void add_to_nodes(const QuadraticDifferences<D, R, T>& by_difference, QuadraticNodes<D, R, T>& found) const {
+        QuadraticNodes<D, R, T> by_control;
         clear(by_control, type->controls);
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < type->difference[j].size(); ++p)
@@ -132,15 +135,15 @@ struct QuadraticParts {
         return found;
     }
 
-    template <class T, std::size_t N>
-    static T weighted(const Sum& sum, const std::array<T, N>& values) {
-        T total{};
+    template <class V, std::size_t N>
+    static V weighted(const Sum& sum, const std::array<V, N>& values) {
+        V total{};
         for (const Share& one : sum) total = total + one.weight * values[one.of];
         return total;
     }
 
    private:
-    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D, R>& points, int) : type(&of) {
+    QuadraticParts(const QuadraticType& of, const QuadraticNodes<D, R, T>& points, int) : type(&of) {
         std::copy_n(points.begin(), of.controls, control.begin());
         find();
     }
@@ -166,25 +169,25 @@ struct QuadraticParts {
             for (int p = 0; p < size(0); ++p)
                 for (int k = 0; k < type->normals; ++k) coefficient[*to++] += dot(difference[0][p], normal[k]);
         }
-        for (int i = 0; i < type->coefficients; ++i) coefficient[i] *= type->unscaled[i];
+        for (int i = 0; i < type->coefficients; ++i) coefficient[i] = type->unscaled[i] * coefficient[i];
     }
 
-    void pull_back(const double* g, std::array<std::array<Vec<D>, R::DIFFERENCES>, 3>& by_difference) const {
+    void pull_back(const T* g, QuadraticDifferences<D, R, T>& by_difference) const {
         const int* to = type->coefficient_of.data();
         if constexpr (D == 2) {
             for (int p = 0; p < size(0); ++p)
                 for (int q = 0; q < size(1); ++q) {
-                    const double here = g[*to++];
-                    const Vec<2>&a = difference[0][p], &b = difference[1][q];
-                    by_difference[0][p] = by_difference[0][p] + here * Vec<2>{b[1], -b[0]};
-                    by_difference[1][q] = by_difference[1][q] + here * Vec<2>{-a[1], a[0]};
+                    const T here = g[*to++];
+                    const Vec<2, T>&a = difference[0][p], &b = difference[1][q];
+                    by_difference[0][p] = by_difference[0][p] + here * Vec<2, T>{b[1], -b[0]};
+                    by_difference[1][q] = by_difference[1][q] + here * Vec<2, T>{-a[1], a[0]};
                 }
         } else {
-            std::array<Vec<3>, R::NORMALS> by_normal;
+            std::array<Vec<3, T>, R::NORMALS> by_normal;
             clear(by_normal, type->normals);
             for (int p = 0; p < size(0); ++p)
                 for (int k = 0; k < type->normals; ++k) {
-                    const double here = g[*to++];
+                    const T here = g[*to++];
                     by_difference[0][p] = by_difference[0][p] + here * normal[k];
                     by_normal[k] = by_normal[k] + here * difference[0][p];
                 }
@@ -262,11 +265,11 @@ Verdict judge(const QuadraticParts<D, R>& parts) {
 }
 
 // The straight element of the same corners.
-template <int D, class R>
-QuadraticNodes<D, R> straightened(const QuadraticType& type, const QuadraticNodes<D, R>& nodes) {
-    QuadraticNodes<D, R> straight;
+template <int D, class R, class T>
+QuadraticNodes<D, R, T> straightened(const QuadraticType& type, const QuadraticNodes<D, R, T>& nodes) {
+    QuadraticNodes<D, R, T> straight;
     for (int i = 0; i < type.nodes; ++i) {
-        straight[i] = Vec<D>{};
+        straight[i] = Vec<D, T>{};
         for (const Share& one : type.between[i]) straight[i] = straight[i] + one.weight * nodes[one.of];
     }
     return straight;
@@ -308,11 +311,12 @@ double longest_edges2(const QuadraticType& type, const Edges<D>& derivatives) {
     return product2;
 }
 
-// The smallest scaled Jacobian at the nodes; 0 where a derivative is none.
+// The smallest scaled Jacobian at the nodes, but those where it depends on a free node; 0 where a derivative is none.
 template <int D, class R>
-double scaled_jacobian(const QuadraticParts<D, R>& parts) {
+double scaled_jacobian(const QuadraticParts<D, R>& parts, const NodeSet& free = {}) {
     double smallest = INFINITY;
     for (int node = 0; node < parts.type->nodes; ++node) {
+        if ((parts.type->node_depends[node] & free).any()) continue;
         const Edges<D> e = parts.at_node(node);
         const double product2 = longest_edges2<D>(*parts.type, e);
         smallest = std::min(smallest, product2 > 0.0 ? determinant(e) / std::sqrt(product2) : 0.0);

@@ -7,19 +7,25 @@
 // D are the differences of control points, D0 those of the straight element at rest, and `size` its det J: t is 1 where the
 // element is straight. Where nodes are bound to balls, their variables are points w of all of space: the position is
 // centre + radius w / sqrt(1 + w^2). The first term is that of foldover.hpp for the measure; the second keeps the shape. Where all t are
-// positive every coefficient is larger than floor * size.
+// positive every coefficient is larger than floor * size. For shapes the floor is that of the scaled Jacobians at the nodes: another
+// mean of such terms, over these, beside that of the coefficients with a floor of their own.
+//
+// LANES elements of a type are looked at side by side; sums are over the elements, one behind the other.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/numbers.hpp"
 #include "quadratic/mesh.hpp"
 #include "moves/foldover.hpp"
+#include "quadratic/jacobians.hpp"
 
 namespace meshfix {
 
 struct QuadraticGoal {
     double eps = 1.0, floor = 0.0;
+    std::optional<double> kept{};  // for shapes, the floor of the coefficients
 };
 
 // What is minimised over: the elements that have a free node. Variables are the steps of these from where they are, each in a
@@ -38,16 +44,19 @@ class QuadraticEnergy {
         for (std::int64_t e = 0; e < mesh.size(); ++e) {
             const NodeSet here = mesh.marked(free, e);
             if (!here.any()) continue;
+            if (groups_.empty() || groups_.back().count == LANES || mesh.codes[elements_.back()] != mesh.codes[e])
+                groups_.push_back({static_cast<std::int32_t>(elements_.size())});
+            ++groups_.back().count;
             elements_.push_back(static_cast<std::int32_t>(e));
             free_.push_back(here);
             sizes_.push_back(sizes[e]);
-            at_rest(e, rest);
             slopes_at_.push_back(slopes_at_.back() + mesh.type(e).nodes);
         }
+        for (Group& group : groups_) prepare(group, rest);
         start_ = points_;
         radius_ = reach.radius;
         centre_in(reach);
-        parts_.resize(items());
+        parts_.resize(elements_.size());
         slopes_.resize(slopes_at_.back());
         place_of_.assign(mesh.size(), -1);
         for (std::size_t i = 0; i < elements_.size(); ++i) place_of_[elements_[i]] = static_cast<std::int32_t>(i);
@@ -65,11 +74,9 @@ class QuadraticEnergy {
 
     double operator()(const double* u, double* gradient) {
         for (std::size_t i = 0; i < moving_.size(); ++i) place(i, unit_[i] * load<D>(u + i * D));
-        for_each_range(static_cast<std::int64_t>(elements_.size()), QUADRATIC_PER_ITEM, threads_,
-                       [&](std::int64_t begin, std::int64_t end, std::int64_t item) {
-                           Part part;
-                           for (std::int64_t i = begin; i < end; ++i) look_at(i, part);
-                           parts_[item] = part;
+        for_each_range(static_cast<std::int64_t>(groups_.size()), QUADRATIC_PER_ITEM / LANES, threads_,
+                       [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+                           for (std::int64_t i = begin; i < end; ++i) look_at(groups_[i]);
                        });
         for_each_range(static_cast<std::int64_t>(moving_.size()), PER_ITEM, threads_,
                        [&](std::int64_t begin, std::int64_t end, std::int64_t) {
@@ -88,20 +95,60 @@ class QuadraticEnergy {
     struct Part {
         double energy = 0.0, smallest = INFINITY;
     };
-    std::int64_t items() const { return (static_cast<std::int64_t>(elements_.size()) + QUADRATIC_PER_ITEM - 1) / QUADRATIC_PER_ITEM; }
+    using Parts = QuadraticParts<D, R, Pack>;
+    using Nodes = QuadraticNodes<D, R, Pack>;
 
-    void at_rest(std::int64_t e, const double* rest) {
-        const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D, R> parts(type, straightened<D, R>(type, mesh_->local<D, R>(rest, e)));
-        std::array<double, 3> stiffness{};
-        rest_at_.push_back(rest_.size());
-        for (int j = 0; j < D; ++j) {
-            rest_.insert(rest_.end(), parts.difference[j].begin(), parts.difference[j].begin() + type.difference[j].size());
-            double sum = 0.0;
-            for (std::size_t p = 0; p < type.difference[j].size(); ++p) sum += type.share2[j][p] * norm2(parts.difference[j][p]);
-            stiffness[j] = sum > 0.0 ? QUADRATIC_STRAIGHT / sum : 0.0;
+    // Up to LANES elements of a type side by side; the last one fills what is left.
+    struct Group {
+        std::int32_t first;
+        int count = 0;
+        std::size_t rest = 0, on = 0, nodes_on = 0;  // where its differences at rest begin, and its lanes of coefficients and nodes
+        Pack to_b{};
+        std::array<Pack, 3> stiffness{};  // for each direction what |D - D0|^2 is multiplied by
+    };
+
+    std::int32_t element(const Group& group, int lane) const { return group.first + std::min(lane, group.count - 1); }
+    const QuadraticType& type_of(const Group& group) const { return mesh_->type(elements_[group.first]); }
+
+    Nodes local(const Group& group, const double* points) const {
+        Nodes found;
+        std::array<const std::int32_t*, LANES> nodes;
+        std::array<Vec<D>, LANES> origin;
+        for (int lane = 0; lane < LANES; ++lane) {
+            nodes[lane] = mesh_->nodes_of(elements_[element(group, lane)]);
+            origin[lane] = load<D>(points + static_cast<std::int64_t>(nodes[lane][0]) * D);
         }
-        stiffness_.push_back(stiffness);
+        for (int i = 0; i < type_of(group).nodes; ++i)
+            for (int k = 0; k < D; ++k)
+                found[i][k] = gathered([&](int lane) { return points[static_cast<std::int64_t>(nodes[lane][i]) * D + k] - origin[lane][k]; });
+        return found;
+    }
+
+    void prepare(Group& group, const double* rest) {
+        const QuadraticType& type = type_of(group);
+        const Parts parts(type, straightened<D, R>(type, local(group, rest)));
+        group.rest = rest_.size();
+        for (int j = 0; j < D; ++j) {
+            const auto count = type.difference[j].size();
+            rest_.insert(rest_.end(), parts.difference[j].begin(), parts.difference[j].begin() + count);
+            Pack sum = constant<Pack>(0.0);
+            for (std::size_t p = 0; p < count; ++p) sum += type.share2[j][p] * norm2(parts.difference[j][p]);
+            const Pack zero = constant<Pack>(0.0);
+            group.stiffness[j] = select(sum > zero, constant<Pack>(QUADRATIC_STRAIGHT) / sum, zero);
+        }
+        group.to_b = gathered([&](int lane) { return 1.0 / sizes_[element(group, lane)]; });
+        group.on = on_.size();
+        for (const NodeSet& nodes : type.depends) on_.push_back(lanes(group, nodes));
+        group.nodes_on = on_.size();
+        for (const NodeSet& nodes : type.node_depends) on_.push_back(lanes(group, nodes));
+    }
+
+    // The lanes, as bits, in which one of some nodes is free.
+    std::uint8_t lanes(const Group& group, const NodeSet& nodes) const {
+        unsigned found = 0;
+        for (int lane = 0; lane < LANES; ++lane)
+            found |= static_cast<unsigned>((nodes & free_[element(group, lane)]).any()) << lane;
+        return static_cast<std::uint8_t>(found);
     }
 
     // The variables at the start, in balls, by nodes; those that are on the rim are drawn inside.
@@ -145,36 +192,82 @@ class QuadraticEnergy {
         }
     }
 
-    void look_at(std::int64_t i, Part& part) {
-        const std::int32_t e = elements_[i];
-        const QuadraticType& type = mesh_->type(e);
-        const QuadraticParts<D, R> parts(type, mesh_->local<D, R>(points_.data(), e));
-        std::array<double, R::COEFFICIENTS> slope;
-        const double to_b = 1.0 / sizes_[i], to_t = 1.0 / (1.0 - goal.floor), share = 1.0 / type.coefficients;
-        double sum = 0.0;
-        for (int k = 0; k < type.coefficients; ++k) {
-            const double b = parts.coefficient[k] * to_b, t = (b - goal.floor) * to_t;
-            slope[k] = 0.0;
-            if (!(type.depends[k] & free_[i]).any()) continue;  // nothing can be done about it
-            const Chi<double> chi(t, goal.eps);
-            const double value = (1.0 + t * t) * chi.inverse;
-            sum += value;
-            slope[k] = share * to_t * to_b * (2.0 * t * chi.inverse - value * chi.decay);
-            if (!(b >= part.smallest)) part.smallest = b;
+    void look_at(const Group& group) {
+        const QuadraticType& type = type_of(group);
+        const Parts parts(type, local(group, points_.data()));
+        Term of_coefficients(goal.eps, goal.kept.value_or(goal.floor), type.coefficients);
+        std::array<Pack, R::COEFFICIENTS> slope;
+        for (int k = 0; k < type.coefficients; ++k)
+            slope[k] = group.to_b * of_coefficients.slope(group.to_b * parts.coefficient[k], on_[group.on + k]);
+        Nodes slopes = parts.slopes(slope);
+        Pack energy = of_coefficients.mean() + straightness(group, parts, slopes), smallest = of_coefficients.smallest;
+        if (goal.kept) {
+            const Pack zero = constant<Pack>(0.0);
+            Term of_jacobians(goal.eps, goal.floor, type.nodes);
+            add_shapes(group, parts, of_jacobians, slopes);
+            energy += of_jacobians.mean();
+            smallest = select(smallest > *goal.kept, of_jacobians.smallest, smaller(zero, of_jacobians.smallest));
         }
-        QuadraticNodes<D, R> slopes = parts.slopes(slope);
-        part.energy += share * sum + straightness(i, parts, slopes);
-        std::copy_n(slopes.begin(), type.nodes, slopes_.begin() + slopes_at_[i]);
+        for (int lane = 0; lane < group.count; ++lane) {
+            const std::int32_t i = group.first + lane;
+            parts_[i] = {energy[lane], smallest[lane]};
+            Vec<D>* to = slopes_.data() + slopes_at_[i];
+            for (int node = 0; node < type.nodes; ++node)
+                for (int k = 0; k < D; ++k) to[node][k] = slopes[node][k][lane];
+        }
     }
 
-    double straightness(std::int64_t i, const QuadraticParts<D, R>& parts, QuadraticNodes<D, R>& slopes) const {
-        const Vec<D>* rest = rest_.data() + rest_at_[i];
-        std::array<std::array<Vec<D>, R::DIFFERENCES>, 3> pull;
-        double sum = 0.0;
+    // The mean of (1 + t^2) / chi(t) over values that should be above a floor, and the smallest of them.
+    struct Term {
+        double eps, floor, to_t, share;
+        Pack sum = constant<Pack>(0.0), smallest = constant<Pack>(INFINITY);
+
+        Term(double eps_, double floor_, int count) : eps(eps_), floor(floor_), to_t(1.0 / (1.0 - floor_)), share(1.0 / count) {}
+
+        Pack mean() const { return share * sum; }
+
+        // Takes in a value in lanes where something can be done about it; returns the slope of the mean by it.
+        Pack slope(Pack b, unsigned lanes) {
+            const Pack zero = constant<Pack>(0.0);
+            if (lanes == 0) return zero;
+            const Pack t = to_t * (b - floor);
+            const Chi<Pack> chi(t, eps);
+            Pack value = (constant<Pack>(1.0) + t * t) * chi.inverse;
+            Pack slope = (share * to_t) * (2.0 * t * chi.inverse - value * chi.decay);
+            if (lanes != (1U << LANES) - 1) {
+                const PackMask on = gathered([&](int lane) { return static_cast<double>(lanes >> lane & 1U); }) > zero;
+                value = select(on, value, zero);
+                slope = select(on, slope, zero);
+                b = select(on, b, constant<Pack>(INFINITY));
+            }
+            sum += value;
+            smallest = select(b >= smallest, smallest, b);
+            return slope;
+        }
+    };
+
+    void add_shapes(const Group& group, const Parts& parts, Term& term, Nodes& slopes) const {
+        QuadraticDifferences<D, R, Pack> pull;
+        for (int j = 0; j < D; ++j) clear(pull[j], static_cast<int>(parts.type->difference[j].size()));
+        for (int node = 0; node < parts.type->nodes; ++node) {
+            const unsigned lanes = on_[group.nodes_on + node];
+            if (lanes == 0) continue;
+            const SmoothJacobian<D, Pack> here(*parts.type, parts.at_node(node));
+            const Pack by = term.slope(here.value, lanes);
+            for (int j = 0; j < D; ++j)
+                for (const Share& one : parts.type->at_node[node][j]) pull[j][one.of] = pull[j][one.of] + (one.weight * by) * here.slope[j];
+        }
+        parts.add_to_nodes(pull, slopes);
+    }
+
+    Pack straightness(const Group& group, const Parts& parts, Nodes& slopes) const {
+        const Vec<D, Pack>* rest = rest_.data() + group.rest;
+        QuadraticDifferences<D, R, Pack> pull;
+        Pack sum = constant<Pack>(0.0);
         for (int j = 0; j < D; ++j)
             for (std::size_t p = 0; p < parts.type->difference[j].size(); ++p) {
-                const Vec<D> off = parts.difference[j][p] - *rest++;
-                const double stiffness = parts.type->share2[j][p] * stiffness_[i][j];
+                const Vec<D, Pack> off = parts.difference[j][p] - *rest++;
+                const Pack stiffness = parts.type->share2[j][p] * group.stiffness[j];
                 sum += stiffness * norm2(off);
                 pull[j][p] = (2.0 * stiffness) * off;
             }
@@ -198,9 +291,11 @@ class QuadraticEnergy {
     int threads_;
     std::vector<std::int32_t> moving_, elements_, place_of_;
     std::vector<NodeSet> free_;
-    std::vector<Vec<D>> rest_, slopes_;                   // differences at rest, and slopes of nodes, of one element behind the other
-    std::vector<std::size_t> rest_at_, slopes_at_{0};
-    std::vector<std::array<double, 3>> stiffness_;        // for each direction what |D - D0|^2 is multiplied by
+    std::vector<Group> groups_;
+    std::vector<Vec<D, Pack>> rest_;   // differences at rest, of one group behind the other
+    std::vector<std::uint8_t> on_;
+    std::vector<Vec<D>> slopes_;       // of nodes, of one element behind the other
+    std::vector<std::size_t> slopes_at_{0};
     std::vector<Part> parts_;
     std::vector<Vec<D>> centre_, inside_;  // of the balls, and the variables of these at the start
     double radius_ = INFINITY;

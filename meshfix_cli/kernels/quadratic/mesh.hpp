@@ -66,7 +66,7 @@ struct QuadraticReach {
     double radius;
 };
 
-// Of each element: where it is not valid, its smallest coefficient relative to the straight element, its measure and its
+// Of each element that is looked at: where it is not valid, its smallest coefficient relative to the straight element, its measure and its
 // smallest scaled Jacobian at the nodes.
 struct QuadraticJudgement {
     std::vector<std::uint8_t> verdict;
@@ -74,22 +74,24 @@ struct QuadraticJudgement {
 };
 
 template <int D, class R>
-QuadraticJudgement judge(const QuadraticMesh& mesh, const double* points, int threads) {
+QuadraticJudgement judge(const QuadraticMesh& mesh, const double* points, const std::vector<std::int32_t>& elements, int threads) {
     QuadraticJudgement found;
-    found.verdict.resize(mesh.size());
-    for (auto* values : {&found.smallest, &found.measure, &found.quality}) values->resize(mesh.size());
-    for_each_range(mesh.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-        for (std::int64_t e = begin; e < end; ++e) {
+    const auto count = static_cast<std::int64_t>(elements.size());
+    found.verdict.resize(count);
+    for (auto* values : {&found.smallest, &found.measure, &found.quality}) values->resize(count);
+    for_each_range(count, QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (std::int64_t i = begin; i < end; ++i) {
+            const std::int32_t e = elements[i];
             const QuadraticType& type = mesh.type(e);
             const QuadraticNodes<D, R> nodes = mesh.local<D, R>(points, e);
             const QuadraticParts<D, R> parts(type, nodes);
             const auto finite = [](double x) { return std::isfinite(x) ? x : 0.0; };
             double sum = 0.0;
-            for (int i = 0; i < type.coefficients; ++i) sum += parts.coefficient[i];
-            found.verdict[e] = static_cast<std::uint8_t>(judge(parts));
-            found.smallest[e] = finite(parts.smallest() / straight_size<D, R>(type, nodes));
-            found.measure[e] = sum / type.coefficients * type.integral;
-            found.quality[e] = finite(scaled_jacobian(parts));
+            for (int k = 0; k < type.coefficients; ++k) sum += parts.coefficient[k];
+            found.verdict[i] = static_cast<std::uint8_t>(judge(parts));
+            found.smallest[i] = finite(parts.smallest() / straight_size<D, R>(type, nodes));
+            found.measure[i] = sum / type.coefficients * type.integral;
+            found.quality[i] = finite(scaled_jacobian(parts));
         }
     });
     return found;

@@ -54,6 +54,7 @@ class QuadraticType {
     std::vector<int> corner_coefficient;         // the coefficient that is det J at each corner
     std::vector<NodeSet> depends;                // for each coefficient the nodes that it depends on
     std::vector<std::array<Sum, 3>> at_node;     // for each node the derivative along each direction: sums of differences
+    std::vector<NodeSet> node_depends;           // and the nodes that these depend on
     std::vector<std::array<std::vector<Sum>, 2>> halves;   // the control points of both halves, for each way to halve
     std::vector<std::array<int, 2>> cut;                   // the barycentric coordinates of both ends of the edge that is halved so
 
@@ -441,8 +442,12 @@ class QuadraticType {
 
     void find_at_nodes() {
         at_node.resize(nodes);
+        node_depends.resize(nodes);
         for (int i = 0; i < nodes; ++i)
-            for (int direction = 0; direction < dimension; ++direction) at_node[i][direction] = derivative(direction, place_[i]);
+            for (int direction = 0; direction < dimension; ++direction) {
+                at_node[i][direction] = derivative(direction, place_[i]);
+                node_depends[i] = node_depends[i] | nodes_of(at_node[i][direction], direction);
+            }
     }
 
     // The half beside the first end of an edge: there the other end is the middle. Blossoms.

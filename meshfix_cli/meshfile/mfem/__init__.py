@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli.errors import ReadError
 from meshfix_cli.mesh.lagrange import HIGHEST, Kind, key_of
+from meshfix_cli.mesh.topology import distinct
 from meshfix_cli.meshfile.mfem.nodes import Linear, higher_order, own_nodes
 from meshfix_cli.meshfile.source import Cells, Source
 from meshfix_cli.meshfile.splice import InPlace, Places
@@ -252,7 +253,7 @@ def _put(runs: Runs, cells: Cells, corners: Callable[[], Places], mesh: _Mesh, s
     runs.add(cells, corners, {_ATTRIBUTE: attributes})
     sets = mesh.sets.get("attribute_sets" if section == "elements" else "bdr_attribute_sets", {})
     if section == "boundary":
-        sets = {f"boundary {one}": np.array([one]) for one in np.unique(attributes).tolist()} | sets
+        sets = {f"boundary {one}": np.array([one]) for one in distinct(attributes).tolist()} | sets
     for name, values in sets.items():
         runs.put(name, run, np.flatnonzero(np.isin(attributes, values)))
 

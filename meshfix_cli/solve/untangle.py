@@ -127,6 +127,8 @@ def steps(
                 yield run.mesh, run.record
     if run.choose() or run.take_back():
         yield run.mesh, run.record
+    if run.had_fewer() and run.go_back(untangling=True):  # no smoothing has begun from the best
+        yield run.mesh, run.record
     if run.take_compared():
         yield run.mesh, run.record
     first, last = run.first[1], run.record

@@ -32,6 +32,12 @@ class Reference:
         The distances (q,) are those from the pieces as they are; searches begin at pieces `near` (q,) if there are any.
         """
 
+    def axes(self, points: Float64, shapes: Int32, threads: int) -> Float64:
+        """Return the directions (q d, d) of shapes (q,) where they are nearest to points (q, d).
+
+        Of each d rows the first are orthonormal, one of a curve, two of a surface; the others are 0.
+        """
+
     def farthest(self, corners: Float64, of_corners: bool, threads: int) -> float:
         """Tell how far its pieces are from it at most, with corners (p, d, d) elsewhere: these, or middles."""
 

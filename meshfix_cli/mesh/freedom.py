@@ -78,6 +78,21 @@ class Freedom:
         none = np.empty(0, dtype=np.int32)
         return kernels.Freedom(self.frame[vertices], self.directions, self.axes, none, none)
 
+    def touching(self, vertices: NDArray[np.integer], points: Array, threads: int = 1) -> kernels.Freedom:
+        """Return the same of vertices at positions (v, d), those on surfaces and curves in what touches these there.
+
+        Planes and lines, that is.
+        """
+        frame, curved = self.frame[vertices], self.curved[vertices]
+        if self.shapes is None or not curved.any():
+            return self.of(vertices)
+        known, d = np.int32(len(self.axes)), points.shape[1]
+        axes = self.shapes.kernel.axes(points[curved], frame[curved] - known, threads).reshape(-1, d, d)
+        directions = np.concatenate([self.directions[:known], self.directions[frame[curved]]])
+        frame[curved] = known + np.arange(len(axes), dtype=np.int32)
+        none = np.empty(0, dtype=np.int32)
+        return kernels.Freedom(frame, directions, np.concatenate([self.axes, axes]), none, none)
+
     def part(self, vertices: Numbers, own: int) -> Freedom:
         """Return that of a part of the mesh: vertices (v,), of which the first `own` have their neighbours in it."""
         number = np.full(len(self.frame), -1, dtype=np.int32)

@@ -113,7 +113,7 @@ def minimisations(
     """
     if not (free.any() and reach.distance > 0):
         return
-    region = _Region(mesh, free, reach, threads, freedom)
+    region = FoldoverRegion(mesh, free, reach, threads, freedom)
     for effort in efforts:
         yield from region.minimise(points, region.uniform(points), effort)
         embedded = embedding(points, mesh, free, threads, freedom)
@@ -167,7 +167,7 @@ def drawn_into_reach(
     """
     if not (free.any() and 0 < reach.distance < math.inf):
         return
-    region = _Region(mesh, free, reach, threads, freedom)
+    region = FoldoverRegion(mesh, free, reach, threads, freedom)
     for points in minimisations(reach.start, mesh, free, Reach(reach.start), threads, freedom=freedom):
         if region.is_valid(points):
             yield from region.draw(points)
@@ -200,7 +200,7 @@ def minimisations_to(
     """
     if not (free.any() and reach.distance > 0):
         return
-    region = _Region(mesh, free, reach, threads, freedom)
+    region = FoldoverRegion(mesh, free, reach, threads, freedom)
     targets = np.ascontiguousarray(inverses[region.rows])
     if until_valid:
         yield from (moved for effort in (QUICK, THOROUGH) for moved in region.minimise(points, targets, effort))
@@ -220,7 +220,7 @@ def evened(
 
     The parameters are those of `minimisations`.
     """
-    return _Region(mesh, free, Reach(points), threads, freedom).even(points, iterations)
+    return FoldoverRegion(mesh, free, Reach(points), threads, freedom).even(points, iterations)
 
 
 def embedding(
@@ -252,7 +252,7 @@ def embedding(
     return kernels.embedding(points, mesh, free, *inverse_lengths(points, mesh, free, threads), threads)
 
 
-class _Region(Region):
+class FoldoverRegion(Region):
     """The stars of the free vertices, and how far these may go."""
 
     def __init__(
@@ -274,11 +274,14 @@ class _Region(Region):
         A target is the size of a regular simplex: the d-th root of its determinant, in model units. Where elements are
         not all simplices, it is the ideal corner of edges of one length.
         """
+        return self._targets(np.full(len(self.rows), self.size(points)))
+
+    def size(self, points: Array) -> float:
+        """Return the size of the uniform target, in model units."""
         measure = kernels.measure(points, self.global_simplices, self.threads)[0]
         # A region whose own boundary is turned inside out may have no measure, or a negative one.
         mean = max(measure.mean(), 1e-3 * np.abs(measure).mean())
-        size = max(mean / self._unit_measures().mean(), np.finfo(float).tiny) ** (1 / points.shape[1])
-        return self._targets(np.full(len(measure), size))
+        return float(max(mean / self._unit_measures().mean(), np.finfo(float).tiny) ** (1 / points.shape[1]))
 
     def sizes(self, points: Array) -> Array:
         """Return targets (s,) of the sizes that the simplices have at positions (n, d), none much smaller than most."""
@@ -316,7 +319,7 @@ class _Region(Region):
             if problem.min_det > 0 and abs(before - after) < 1e-5 * abs(after):
                 return
             sigma = max(1 - after / before, effort.least_share)
-            eps = _next_eps(eps, problem.min_det, sigma)
+            eps = next_eps(eps, problem.min_det, sigma)
 
     def even(self, valid: Array, iterations: int) -> Array:
         """Return valid points on the way from others to where the energy of the uniform target is smallest."""
@@ -368,7 +371,7 @@ class _Region(Region):
         return points
 
 
-def _next_eps(eps: float, least: float, sigma: float) -> float:
+def next_eps(eps: float, least: float, sigma: float) -> float:
     """Section 3 of the paper: `least` is the smallest determinant, `sigma` the share by which the energy fell."""
     mu = (1 - sigma) * (least + math.hypot(eps, least)) / 2
     return 2 * math.sqrt(mu * (mu - least)) if least < mu else LAST_EPS

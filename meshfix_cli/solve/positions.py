@@ -95,6 +95,10 @@ class Positions:
         free = self.input.judged().without(self.input.stuck(self.threads)).angles(self.points, self.threads)
         return self._least(free) >= math.radians(degrees)
 
+    def had_fewer(self) -> bool:
+        """Whether fewer elements were inverted at some positions before."""
+        return self.best is not None and self.best[2][0] < self.left
+
     def go_back(self, untangling: bool) -> bool:
         """Return to the best positions; False: they are the last.
 

@@ -142,11 +142,11 @@ class Run(Positions):
         simplicial = self.mendable.simplicial or self.surface is not None
         if phase.elements is simplicial or (phase.layers and not simplicial):
             return False
-        if phase.slides and self.freedom is None:
+        if phase.slides and (self.freedom is None or (phase.slides == "curved" and self.freedom.shapes is None)):
             return False
         if Move.DRAW_BACK in phase.moves:
             tangled = self.surface is None or self.first[1].inverted > 0
-            return self.left == 0 and tangled and self.freedom is not None and self.freedom.shapes is not None
+            return self.left == 0 and tangled
         if phase.smooths:
             self._hold_corners()
             if self.targeted != bool(phase.to_reference) or (phase.to_reference and self.left):
@@ -470,7 +470,13 @@ class Run(Positions):
         return np.where((self.free & self.freedom.curved & near)[:, None], self.reference, self.points)
 
     def _minimisations(self, phase: Phase) -> Iterator[Array]:
-        from meshfix_cli.solve.foldover import minimisations_in_regions
+        given = phase.rings, self.max_move, self.threads, self.team.freedom
+        if phase.slides == "curved":
+            from meshfix_cli.solve import on_surfaces
 
-        compute = partial(minimisations_in_regions, phase.rings, self.max_move, self.threads, self.team.freedom)
-        return self._of_whole(compute, self.points, self.first[0], self.together, self._broken())
+            compute, free = partial(on_surfaces.minimisations, *given), self.free
+        else:
+            from meshfix_cli.solve.foldover import minimisations_in_regions
+
+            compute, free = partial(minimisations_in_regions, *given), self.together
+        return self._of_whole(compute, self.points, self.first[0], free, self._broken())

@@ -99,9 +99,10 @@ class Phase:
         The function is that of `layers.py`, which makes up a reference.
     elements : bool or None
         For meshes of other elements than simplices alone; False: of simplices alone; None: of any.
-    slides : bool or None
+    slides : bool, "curved" or None
         False: vertices of the boundary stay, whether or not they may slide: a boundary that is not tangled loses by it.
-        True: for meshes in which some may; None: for any, and they do.
+        True: for meshes in which some may; "curved": on surfaces or along curves, and the energy moves these as well,
+        by `on_surfaces.py`; None: for any, and they do.
     compares : bool
         Where elements are not all simplices, the last mesh is the best one of those after such phases, of which no
         figure is below those after the first.
@@ -121,7 +122,7 @@ class Phase:
     to_reference: Literal["", "follow", "mend", "approach"] = ""
     layers: bool = False
     elements: bool | None = None
-    slides: bool | None = None
+    slides: bool | Literal["curved"] | None = None
     compares: bool = False
     patience: int = 0
 
@@ -145,8 +146,9 @@ _LP_MOST = Phase(
 )  # fmt: skip
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
-_TO_SHAPE = Phase("back to the shape", (Move.DRAW_BACK,), 100, until="settled", from_best=True, slides=True)
+_TO_SHAPE = Phase("back to the shape", (Move.DRAW_BACK,), 100, until="settled", from_best=True, slides="curved")
 _FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
+_ON_SURFACES = replace(_FOLDOVER, name="FF on surfaces", max_sweeps=40, rings=(1, 2, 4, 8), slides="curved")
 
 
 def _starts(rings: tuple[int, ...] = (), slides: bool = False) -> tuple[Phase, ...]:
@@ -169,13 +171,15 @@ STRATEGIES: dict[str, tuple[Phase, ...]] = {
         replace(_FOLDOVER, name="FF in regions", max_sweeps=400, rings=(2, 4, 8, 16)),
         _FOLDOVER,
         _LP_COEFFICIENTS,
+        _ON_SURFACES,
+        *(replace(one, name=f"{one.name}, on surfaces", slides="curved") for one in (_LP_INVALID, _LP_COEFFICIENTS)),
         _LP_MOST,
     ),
     "LS": (_LAPLACIAN,),
     "US": (_LP, _LP_COEFFICIENTS),
     "CS": (Phase("Laplacian or LP", (Move.COMBINED_UNTANGLE,)), _LP_COEFFICIENTS),
     "LUS": (replace(_LAPLACIAN, max_sweeps=3), _LP, _LP_COEFFICIENTS),
-    "FF": (_FOLDOVER, _LP_COEFFICIENTS),
+    "FF": (_FOLDOVER, _ON_SURFACES, _LP_COEFFICIENTS),
 }
 
 # Where there is a reference: elements should have the shapes that they had; the strategy only mends what is left.

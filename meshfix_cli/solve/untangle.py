@@ -104,7 +104,7 @@ def steps(
         limit = SWEEPS if phase.max_sweeps is None else phase.max_sweeps
         if untangling and sweeps is not None:
             limit = sweeps if phase.max_sweeps is None else min(sweeps, phase.max_sweeps)
-        if (limit > 0 or phase.smooths) and phase.from_best and run.go_back(untangling):
+        if limit > 0 and phase.from_best and run.go_back(untangling):
             yield run.mesh, run.record
         waited, run.clock = 0, time.perf_counter()
         for points in islice(run.sweeps(phase), limit):
@@ -126,6 +126,8 @@ def steps(
             if run.compare():
                 yield run.mesh, run.record
     if run.choose() or run.take_back():
+        yield run.mesh, run.record
+    if run.had_fewer() and run.go_back(untangling=True):  # no smoothing has begun from the best
         yield run.mesh, run.record
     if run.take_compared():
         yield run.mesh, run.record

@@ -95,13 +95,6 @@ def test_what_is_impossible_takes_no_others_with_it(seed: int) -> None:
     assert outcome.records[-1].inverted == outcome.after.check()[0]
 
 
-def test_without_smoothing_the_best_mesh_is_the_result() -> None:
-    for seed in range(6):
-        rough = with_a_rough_boundary(Mesh.build(*box_of_hexahedra(27)), 0.6, seed)
-        outcome = untangle(rough, smooth=0)
-        assert outcome.records[-1].inverted == min(record.inverted for record in outcome.records)
-
-
 def test_best_is_no_worse_than_the_default() -> None:
     for name in ("quad plate", "hex plate", "wedges on tets", "every solid"):
         mesh = built(name)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from elements import MESHES
-from geometries import GEOMETRIES, grid
+from geometries import GEOMETRIES, chamber, grid
 from meshes import tangle
 
 from meshfix_cli import Mesh, untangle
@@ -15,7 +15,7 @@ from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.solve.passes import Passes
 from meshfix_cli.solve.positions import GAIN
-from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, plan
+from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, Phase, plan
 from meshfix_cli.solve.untangle import drain, steps
 
 
@@ -166,3 +166,18 @@ def test_a_number_of_passes_is_exact(mesh: Mesh) -> None:
         assert [(phase.moves, phase.max_sweeps) for phase in regular] == [((Move.COMBINED_SMOOTH,), passes)]
         records = untangle(tangle(mesh, 100, 8), smooth=passes).records
         assert sum(record.phase.startswith(SMOOTHING) for record in records) == passes
+
+
+def test_a_last_phase_that_makes_it_worse_is_undone() -> None:
+    """Where no smoothing begins from the best mesh, that is the result all the same."""
+    valid = Mesh.build(*chamber())
+    way = valid.points - valid.points.mean(axis=0)
+    radius, turn = np.linalg.norm(way, axis=1), np.radians(30)
+    inner = valid.topology.boundary & (radius < np.median(radius))
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    turned = valid.with_points(np.where(inner[:, None], valid.points + way @ (rotation.T - np.eye(2)), valid.points))
+    phases = Phase("LP", (Move.UNTANGLE,), 5), Phase("Laplacian", (Move.LAPLACIAN,), 1)
+    *_, before, (_, laplacian), (after, last) = steps(turned, phases)
+    assert laplacian.inverted > before[1].inverted
+    assert (last.phase, last.inverted) == ("best", before[1].inverted)
+    assert after.points.tobytes() == before[0].points.tobytes()

@@ -273,8 +273,7 @@ def test_the_energy_is_minimised_in_a_region_first() -> None:
 
 def test_a_region_that_does_not_help_is_left() -> None:
     """Two rings are too few for a hole that was turned that far; the whole mesh is enough."""
-    whole = next(phase for phase in STRATEGIES["auto"] if phase.name == "FF")
-    phase = replace(whole, rings=(2,))
+    phase = replace(next(one for one in STRATEGIES["auto"] if one.name == "FF"), rings=(2,))
     records = [record for _, record in steps(turned_hole(150), [phase])]
     left = [record.inverted for record in records if record.phase == phase.name]
     assert len(left) < MINIMISATIONS

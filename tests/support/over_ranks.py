@@ -72,6 +72,7 @@ METHODS = {
     "slidingonlyinvalid": Method(only_invalid=True),
     "curved": Method(),
     "curvedbest": Method(smooth="best"),
+    "curvedFF": Method("FF"),
     "curvednear": Method(max_move=REACH),
     "curvedreference": Method(),
     "layers": Method(),

@@ -4,6 +4,7 @@
 
 #include "mesh/crossings.hpp"
 #include "mesh/faces.hpp"
+#include "mesh/feet.hpp"
 #include "mesh/folds.hpp"
 #include "mesh/python.hpp"
 
@@ -341,34 +342,31 @@ Reference at_corners(const Reference& self, const Matrices<const double>& corner
     return self.at_corners(corners.data());
 }
 
-// For points (q, D) each on its shape (q,), from pieces `near` (q,), if there are any: the nearest positions (q, D), and the distances (q,) from the pieces themselves.
-auto nearest_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
-                int threads, const std::int32_t* near) {
-    const std::size_t count = points.shape(0), d = points.shape(1);
-    if (static_cast<int>(d) != self.dimension() || shapes.shape(0) != count)
+OnShapes on_shapes(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
+                   const std::int32_t* near = nullptr) {
+    if (static_cast<int>(points.shape(1)) != self.dimension() || shapes.shape(0) != points.shape(0))
         throw nb::value_error("the points are of another reference");
-    std::vector<double> there(count * d), distances(count);
+    return {points.data(), shapes.data(), static_cast<std::int64_t>(points.shape(0)), near};
+}
+
+auto nearest_py(const Reference& self, const OnShapes& on, int threads) {
+    const int d = self.dimension();
+    std::vector<double> there(on.count * d), distances(on.count);
     with_dimension(d, [&](auto dimension) {
-        constexpr int D = dimension;
-        for_each_range(static_cast<std::int64_t>(count), 1024, threads,
-                       [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-                           for (std::int64_t i = begin; i < end; ++i) {
-                               const Foot<D> foot = self.foot<D>(shapes.data()[i], load<D>(points.data() + i * D),
-                                                                    near == nullptr ? Reference::ANY : near[i], true);
-                               const Vec<D> x = self.rounded<D>(shapes.data()[i], foot);
-                               std::copy(x.begin(), x.end(), there.begin() + i * D);
-                               distances[i] = std::sqrt(foot.distance2);
-                           }
-                       });
+        find_nearest<dimension>(self, on, threads, there.data(), distances.data());
         return 0;
     });
     return std::make_pair(to_numpy(std::move(there), d), to_numpy(std::move(distances)));
 }
 
-auto nearest_near_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
-                     int threads, const Vector<const std::int32_t>& near) {
-    if (near.shape(0) != points.shape(0)) throw nb::value_error("the pieces are of other points");
-    return nearest_py(self, points, shapes, threads, near.data());
+auto axes_py(const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes, int threads) {
+    const OnShapes on = on_shapes(self, points, shapes);
+    std::vector<double> found(points.size() * points.shape(1));
+    with_dimension(points.shape(1), [&](auto dimension) {
+        find_axes<dimension>(self, on, threads, found.data());
+        return 0;
+    });
+    return to_numpy(std::move(found), points.shape(1));
 }
 
 // How far the pieces are from it at most, with their corners elsewhere (p, D, D): these, or middles.
@@ -417,10 +415,15 @@ void bind_mesh(nb::module_& m) {
         .def("let_walk", &let_walk, "vertices"_a.noconvert())
         .def("at_corners", &at_corners, "corners"_a.noconvert(), nb::keep_alive<0, 1>(), nb::keep_alive<0, 2>())
         .def("nearest", [](const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
-                           int threads) { return nearest_py(self, points, shapes, threads, nullptr); },
+                           int threads) { return nearest_py(self, on_shapes(self, points, shapes), threads); },
              "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a)
+        .def("axes", &axes_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a)
         .def("farthest", &farthest_py, "corners"_a.noconvert(), "of_corners"_a, "threads"_a)
-        .def("nearest", &nearest_near_py, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert());
+        .def("nearest", [](const Reference& self, const Matrix<const double>& points, const Vector<const std::int32_t>& shapes,
+                           int threads, const Vector<const std::int32_t>& near) {
+            if (near.shape(0) != points.shape(0)) throw nb::value_error("the pieces are of other points");
+            return nearest_py(self, on_shapes(self, points, shapes, near.data()), threads);
+        }, "points"_a.noconvert(), "shapes"_a.noconvert(), "threads"_a, "near"_a.noconvert());
     m.def("joined", &joined_py, "pairs"_a.noconvert(), "n"_a);
     m.def("check_simplices", &check_simplices_py, "simplices"_a.noconvert(), "n"_a, "threads"_a);
     m.def("used_vertices", &used_vertices_py, "simplices"_a.noconvert(), "n"_a);

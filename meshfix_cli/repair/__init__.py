@@ -249,8 +249,9 @@ class Method:
             found = drain(watch(self._curved_steps(mesh, reach, threads, reference)))
             return Outcome(*found, find_obstacles(found[2], threads))
         if mesh.surface is not None:  # what a fold feigns to be features is free in the end
-            found = drain(watch(self._surface_steps(mesh, reach, threads)))
-            return Outcome(*found, find_obstacles(found[2], threads))
+            from meshfix_cli.solve.surface import solved
+
+            return solved(watch(self._surface_steps(mesh, reach, threads)), threads)
         obstacles = find_obstacles(mesh, threads)
         run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
         return Outcome(*drain(watch(run)), obstacles)

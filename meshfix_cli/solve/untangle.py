@@ -208,7 +208,7 @@ def untangle(
     if mesh.surface is not None:
         from meshfix_cli.mesh import curved
         from meshfix_cli.mesh.surface import laid_by_default
-        from meshfix_cli.solve.surface import surface_steps
+        from meshfix_cli.solve.surface import solved, surface_steps
 
         def sweeping(smooth: Smooth, surface: Mesh) -> Iterator[tuple[Mesh, SweepRecord]]:
             return steps(
@@ -218,8 +218,7 @@ def untangle(
 
         shape = curved.Smooth(FEATURE_ANGLE, MAX_DEVIATION * mesh.mean_edge_length(threads))
         laid = laid_by_default(mesh, shape, places, threads)
-        found = drain(surface_steps(laid, partial(sweeping, 0), partial(sweeping, smooth), max_move, threads))
-        return Outcome(*found, find_obstacles(found[2], threads))
+        return solved(surface_steps(laid, partial(sweeping, 0), partial(sweeping, smooth), max_move, threads), threads)
     phases = plan(strategy, smooth, only_invalid, reference is not None)
     obstacles = find_obstacles(mesh, threads)
     run = steps(

@@ -48,6 +48,8 @@ def laid_out(
 ) -> Mesh:
     """Return a surface whose vertices slide on it, within their patches.
 
+    Of one that is tangled, and nothing else is known of, it is only told who might: it has no shape yet.
+
     Parameters
     ----------
     mesh : Mesh
@@ -71,7 +73,8 @@ def laid_out(
     broken[judged.vertices(inverted)] = True
     plain = None if tangle is None else tangle.plain
     given = Constraints(facets, kept.labels, kept.lines, inverted, broken, normals, plain)
-    freedom = freedom_of(points, given, kept.smooth, flat_of(points, given))
+    has_shape = reference is not None or tangle is not None or not inverted.any()
+    freedom = freedom_of(points, given, kept.smooth, flat_of(points, given), has_shape)
     if reference is not None and _is_elsewhere(freedom, now, ASTRAY * mesh.mean_edge_length(threads), threads):
         return laid_out(mesh, kept, None, threads, tangle)
     degrees = freedom.degrees

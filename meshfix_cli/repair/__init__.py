@@ -242,8 +242,7 @@ class Method:
     ) -> Outcome:
         """Run them to the end; `watch` passes the steps through, to show them."""
         from meshfix_cli.quality.obstacles import find_obstacles
-        from meshfix_cli.solve.records import Outcome
-        from meshfix_cli.solve.untangle import drain
+        from meshfix_cli.solve.records import Outcome, drain
 
         if mesh.quadratic is not None:  # what is impossible may change, as its boundary may
             found = drain(watch(self._curved_steps(mesh, reach, threads, reference)))

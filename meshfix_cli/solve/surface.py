@@ -14,7 +14,7 @@ from meshfix_cli.mesh.surface import in_planes, laid_out, seen
 from meshfix_cli.mesh.tangle import Tangle, normals_of_vertices
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.quality.summary import summarise
-from meshfix_cli.solve.records import Outcome
+from meshfix_cli.solve.records import Outcome, drain
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
@@ -46,10 +46,13 @@ def surface_steps(
     surface = mesh.surface
     assert surface is not None and surface.kept is not None
     inverted, smallest = mesh.check(threads)
-    if surface.has_reference or inverted == 0 or reach < math.inf:
+    if surface.has_reference or inverted == 0:
         yield from smooth(mesh)
         return
     tangle = Tangle.of(mesh, threads)
+    if reach < math.inf:
+        yield from smooth(laid_out(mesh, surface.kept, threads=threads, tangle=tangle))
+        return
     best, first = mesh, True
     for _ in range(ROUNDS):
         flat = moved = in_planes(best, tangle, threads)
@@ -77,8 +80,6 @@ def solved(run: Steps, threads: int) -> Outcome:
     Without a reference each of its meshes is seen as it is by itself, not from where it was while vertices moved; what
     is worse so than the first is not taken.
     """
-    from meshfix_cli.solve.untangle import drain
-
     before, untangled, after, records = drain(run)
     assert before.surface is not None
     if not before.surface.has_reference:

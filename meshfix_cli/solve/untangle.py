@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.reference import reference_points
 from meshfix_cli.quality.obstacles import find_obstacles
-from meshfix_cli.solve.records import Outcome, SweepRecord
+from meshfix_cli.solve.records import Outcome, SweepRecord, drain
 from meshfix_cli.solve.run import Run
 from meshfix_cli.solve.strategies import (
     FEATURE_ANGLE,
     MAX_DEVIATION,
     SMOOTH,
-    SMOOTHING,
     SWEEPS,
     THRESHOLD,
     Phase,
@@ -136,20 +135,6 @@ def steps(
     lost = worse or (to_the_ceiling and first.inverted == 0 and not run.gained())
     if lost and run.go_back(untangling=False):
         yield run.mesh, run.record
-
-
-def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tuple[SweepRecord, ...]]:
-    """Take all steps; return the mesh as it came, untangled and smoothed, and the records."""
-    run = iter(run)
-    mesh, record = next(run)
-    before = untangled = mesh
-    records, smooths = [record], False
-    for mesh, record in run:
-        smooths = smooths or record.phase.startswith(SMOOTHING)  # also where it goes back to the best
-        if not smooths:
-            untangled = mesh
-        records.append(record)
-    return before, untangled, mesh, tuple(records)
 
 
 def untangle(

@@ -79,7 +79,7 @@ auto relocate_on_surface_py(int move, const Matrix<double>& points, const Vector
                                            static_cast<std::int64_t>(blocks.shape(0)), threads,
                                            [&](SurfaceRelocation& work) {
                                                work.normals = normals.data();
-                                               if (ahead) work.ahead = ahead->data();
+                                               work.ahead = ahead ? ahead->data() : nullptr;
                                            });
     });
     return std::make_pair(counts.visited, counts.moved);

@@ -116,7 +116,8 @@ struct SurfaceRelocation {
     bool valid(const Vec<3>& p) const { return quality(p) > 0.0; }
 
     bool is_near(std::int64_t v, const Vec<3>& p) const {
-        const Nearness<3> nearness(points, parameters);
+        Nearness<3> nearness(points, parameters);
+        if (directions.curved()) nearness.begin_at(directions.shape, directions.piece);
         return nearness.is_bounded(v) ? nearness.is_near(v, p) : nearness.is_in_reach(v, p);
     }
 

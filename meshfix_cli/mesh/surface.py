@@ -44,11 +44,14 @@ def seen(mesh: Mesh, threads: int = 1) -> Mesh:
 
 
 def laid_out(
-    mesh: Mesh, kept: Kept, reference: Array | None = None, threads: int = 1, tangle: Tangle | None = None
+    mesh: Mesh,
+    kept: Kept,
+    reference: Array | None = None,
+    threads: int = 1,
+    tangle: Tangle | None = None,
+    with_shape: bool = True,
 ) -> Mesh:
     """Return a surface whose vertices slide on it, within their patches.
-
-    Of one that is tangled, and nothing else is known of, it is only told who might: it has no shape yet.
 
     Parameters
     ----------
@@ -60,6 +63,8 @@ def laid_out(
     threads : int
     tangle : Tangle, optional
         That was there: its traces are no features.
+    with_shape : bool
+        False: of one that is tangled, and nothing else is known of, it is only told who might slide, and nobody does.
     """
     surface, topology = mesh.surface, mesh.topology
     assert surface is not None
@@ -73,10 +78,10 @@ def laid_out(
     broken[judged.vertices(inverted)] = True
     plain = None if tangle is None else tangle.plain
     given = Constraints(facets, kept.labels, kept.lines, inverted, broken, normals, plain)
-    has_shape = reference is not None or tangle is not None or not inverted.any()
+    has_shape = with_shape or reference is not None or tangle is not None or not inverted.any()
     freedom = freedom_of(points, given, kept.smooth, flat_of(points, given), has_shape)
     if reference is not None and _is_elsewhere(freedom, now, ASTRAY * mesh.mean_edge_length(threads), threads):
-        return laid_out(mesh, kept, None, threads, tangle)
+        return laid_out(mesh, kept, None, threads, tangle, with_shape)
     degrees = freedom.degrees
     moves = degrees == 2 if tangle is None else (degrees == 2) & ~tangle.features
     if kept.slide != "none":

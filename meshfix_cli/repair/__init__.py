@@ -181,7 +181,7 @@ class Method:
         `reference`: see `untangle.steps`; not where the boundary was displaced, which says where it is to be.
         """
         if document.mesh.surface is not None:
-            return self.on_surface(document, reference)
+            return self.on_surface(document, reference, with_shape=False)
         if self.slide == "none" or document.mesh.quadratic is not None:  # corners and nodes would part
             return document
         from meshfix_cli.meshfile.sliding import slid
@@ -190,13 +190,17 @@ class Method:
         return slid(document, self.slide_interfaces, reference, smooth=smooth)
 
     def on_surface(
-        self, document: Document, reference: NDArray[np.float64] | None = None, threads: int = 1
+        self,
+        document: Document,
+        reference: NDArray[np.float64] | None = None,
+        threads: int = 1,
+        with_shape: bool = True,
     ) -> Document:
-        """Return a document of a surface in which vertices slide on it, as they always do."""
+        """Return a document of a surface in which vertices slide on it, as they always do; see `surface.laid_out`."""
         from meshfix_cli.meshfile.surfaces import on_surface
 
         smooth = self._smooth(document, reference)
-        return on_surface(document, smooth, self.slide, self.slide_interfaces, reference, threads)
+        return on_surface(document, smooth, self.slide, self.slide_interfaces, reference, threads, with_shape)
 
     def _smooth(self, document: Document, reference: NDArray[np.float64] | None) -> curved.Smooth:
         from meshfix_cli.mesh.curved import Smooth

@@ -36,7 +36,7 @@ def surface_steps(
     Parameters
     ----------
     mesh : Mesh
-        As `surface.laid_out` gives it.
+        As `surface.laid_out` gives it, whether or not with a shape.
     untangle, smooth : callable
         Run the phases that untangle, and all of them.
     reach : float
@@ -69,6 +69,8 @@ def surface_steps(
         best, tangle, inverted = now, around.without_doubtful(now, threads), left
         if left == 0:
             break
+    if best is mesh:
+        best = laid_out(mesh, surface.kept, threads=threads, tangle=tangle)
     for moved, record in smooth(best):
         if record.phase != "input":
             yield moved, record

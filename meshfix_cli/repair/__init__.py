@@ -175,13 +175,16 @@ class Method:
     max_deviation: Distance = MAX_DEVIATION
     curving: Curving = "hold"
 
-    def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
+    def freed(
+        self, document: Document, reference: NDArray[np.float64] | None = None, with_shape: bool = True
+    ) -> Document:
         """Return a document in which vertices may slide, if they are to.
 
         `reference`: see `untangle.steps`; not where the boundary was displaced, which says where it is to be.
+        `with_shape`: see `surface.laid_out`; `solve` gives surfaces theirs.
         """
         if document.mesh.surface is not None:
-            return self.on_surface(document, reference, with_shape=False)
+            return self.on_surface(document, reference, with_shape=with_shape)
         if self.slide == "none" or document.mesh.quadratic is not None:  # corners and nodes would part
             return document
         from meshfix_cli.meshfile.sliding import slid
@@ -374,7 +377,7 @@ def _solved(
     if document.mesh.quadratic is not None:
         return document, solve(document.mesh, reach), method.without_effect(document.mesh)
     shape = reference if document.displaced is None else None
-    freed = method.freed(document, shape)
+    freed = method.freed(document, shape, with_shape=False)
     outcome = solve(freed.mesh, reach)
     notes: tuple[str, ...] = ()
     rounded = 0  # elements that rounding has inverted: then less may be better also where it is valid
@@ -382,7 +385,7 @@ def _solved(
         left, rounded = outcome.records[-1].inverted, rounded or freed.first_valid_as_stored(outcome.after)[1]
         if not (left or rounded):
             break
-        other = replace(method, slide=slide).freed(document, shape)
+        other = replace(method, slide=slide).freed(document, shape, with_shape=False)
         instead = solve(other.mesh, reach)
         if _rank(other, instead) < _rank(freed, outcome):
             freed, outcome = other, instead

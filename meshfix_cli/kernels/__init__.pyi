@@ -15,6 +15,7 @@ from meshfix_cli.kernels._quadratic import QuadraticEnergy as QuadraticEnergy
 from meshfix_cli.kernels._quadratic import QuadraticMesh as QuadraticMesh
 from meshfix_cli.kernels._quadratic import QuadraticType as QuadraticType
 from meshfix_cli.kernels._surface import Reference as Reference
+from meshfix_cli.kernels._surface import Sample as Sample
 from meshfix_cli.kernels._surface import area_vectors as area_vectors
 from meshfix_cli.kernels._surface import around_pieces as around_pieces
 from meshfix_cli.kernels._surface import check_unfolded as check_unfolded
@@ -23,9 +24,9 @@ from meshfix_cli.kernels._surface import dots_between as dots_between
 from meshfix_cli.kernels._surface import edge_lengths as edge_lengths
 from meshfix_cli.kernels._surface import fan_normals as fan_normals
 from meshfix_cli.kernels._surface import joints as joints
+from meshfix_cli.kernels._surface import normals_around as normals_around
 from meshfix_cli.kernels._surface import off_reference as off_reference
 from meshfix_cli.kernels._surface import pairs_from as pairs_from
-from meshfix_cli.kernels._surface import refit as refit
 from meshfix_cli.kernels._surface import relocate_on_surface as relocate_on_surface
 from meshfix_cli.kernels._surface import rows_of_pairs as rows_of_pairs
 from meshfix_cli.kernels._surface import sines_between as sines_between

@@ -65,8 +65,18 @@ def relocate_on_surface(
     threads: int,
     freedom: Freedom,
     normals: Float64,
+    ahead: Float64 | None = None,
 ) -> tuple[int, int]:
-    """As `relocate`, in the planes, and on the lines, surfaces and curves of a freedom; seen from normals (m, 3)."""
+    """As `relocate`, in the planes, and on the lines, surfaces and curves of a freedom; seen from normals (m, 3).
+
+    With places `ahead` (n, 3) vertices go there, whatever the move, as far as elements below the threshold get no
+    worse.
+    """
+
+def normals_around(
+    points: Float64, offsets: Int32, nodes: Int32, mesh: Connectivity, edges: NDArray[np.bool_], threads: int
+) -> tuple[Float64, Float64]:
+    """The unit normals of vertices (k, 3) and elements (m, 3) by what is around them; see `sides.normals_around`."""
 
 def unit_vectors(vectors: Float64) -> Float64:
     """Vectors (n, d) of length 1; those without a length are zero."""
@@ -113,14 +123,25 @@ def pairs_from(edges: Int32, marks: NDArray[np.bool_]) -> Int32:
 def rows_of_pairs(pairs: Int32, n: int) -> tuple[Int32, Int32]:
     """Compressed rows of pairs (p, 2) of numbers below n: offsets (n + 1,), and the second ones of each, ascending."""
 
-def refit(
-    points: Float64, rows: Int32, normals: Float64, sample: Float64, seen: Float64, smooth: float, threads: int
-) -> None:
-    """Move some points (k, 3), by their rows, along unit normals (k, 3) to the surface that a sample is of.
+class Sample:
+    """Points of a surface, and unit normals there; it keeps the arrays, which stay as they are."""
 
-    `sample` and `seen` (n, 3) are points, seven or more, and unit normals there. What the quadric through the nearest
-    leaves of them, relative to their distance, is less than `smooth`, else a point stays.
-    """
+    def __init__(self, points: Float64, seen: Float64) -> None:
+        """Take points (n, 3), one or more, and normals (n, 3)."""
+
+    def refit(self, points: Float64, rows: Int32, normals: Float64, smooth: float, threads: int) -> None:
+        """Move some points (k, 3), by their rows, along unit normals (k, 3) to the surface.
+
+        What the quadric through the nearest, seven or more, leaves of them, relative to their distance, is less than
+        `smooth`, else a point stays.
+        """
+
+    def left(self, places: Float64, normals: Float64, threads: int) -> Float64:
+        """Tell what quadrics at places (k, 3), over planes of unit normals (k, 3), leave (k, 2) of the points there.
+
+        That is the root of the mean of the squares, of the distance of the farthest, infinite where there is no
+        quadric; and how far the place is from the quadric, of what the farthest of the others is.
+        """
 
 def off_reference(freedom: Freedom, points: Float64, bound: float, threads: int) -> NDArray[np.uint8]:
     """Mark the vertices (k,) on the pieces of a reference that are farther from them than a bound."""

@@ -251,6 +251,9 @@ class _Solid(_Shaped):
         super().__init__(points, given, smooth)
         self.joints = joints
         good = self.meet_smoothly(self.joints.pairs)
+        if given.plain is not None:
+            one, other = given.labels[self.joints.pairs].T
+            good |= (one == other) & given.plain[self.joints.at].any(axis=1)
         self.is_feature, self.around = self.joints.divided(good)
         self.patch = kernels.joined(np.ascontiguousarray(self.joints.pairs[good]), len(given.facets))
 

@@ -44,6 +44,8 @@ class Constraints:
         The vertices of inverted elements.
     normals : (f, 3) float64, optional
         Unit normals that facets of a surface should have: the facets may be turned over.
+    plain : (k,) bool, optional
+        Vertices of a surface that are on no feature, whatever the facets there say.
     """
 
     facets: Numbers
@@ -52,6 +54,7 @@ class Constraints:
     inverted: Mask
     broken: Mask
     normals: Array | None = None
+    plain: Mask | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,8 +260,8 @@ class Joints:
         Of the facets, and the lines beside them.
     count : (e,) int
         How many facets each is of.
-    pairs : (p, 2) int32
-        Facets that meet at an edge of theirs alone, which is no line.
+    pairs, at : (p, 2) int32
+        Facets that meet at an edge of theirs alone, which is no line, and the ends of that.
     """
 
     def __init__(self, facets: Numbers, lines: Numbers, n: int) -> None:
@@ -269,6 +272,11 @@ class Joints:
         first = np.concatenate([[0], np.cumsum(self.count)])[self._between]
         self._two = np.stack([here[first], here[first + 1]], axis=1)  # sides
         self.pairs = self._owners[self._two]
+
+    @property
+    def at(self) -> Numbers:
+        """(p, 2) int32: see above."""
+        return self.edges[self._between]
 
     def divided(self, smooth: Mask) -> tuple[Mask, Around]:
         """Return at which edges (e,) facets do not go on in each other, as some pairs (p,) do, and their fans."""

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Numbers = NDArray[np.int32]
-RINGS = 1  # of neighbours whose stars give a vertex its normal, where elements are turned over
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +78,7 @@ def normals_seen(topology: Topology, points: Array, threads: int) -> Array:
     flat = _are_zero(own)
     if not (turned.any() or flat.any()):
         return own
-    by_stars = unit_vectors(around(topology, areas)[1])
+    by_stars = normals_around(topology, points, threads)[1]
     patch = kernels.joined(np.ascontiguousarray(pairs[~turned]), len(own))
     (x, y, z), (a, b, c) = areas.T, by_stars.T
     along = x * a + y * b + z * c  # as a sum along rows it takes five times as long
@@ -95,22 +94,14 @@ def _are_zero(vectors: Array) -> Mask:
     return np.asarray((x == 0) & (y == 0) & (z == 0))
 
 
-def around(topology: Topology, areas: Array, edges: Mask | None = None) -> tuple[Array, Array]:
-    """Return the area as a vector of what is around each vertex (k, 3), and the sum of it for each element (m, 3).
+def normals_around(topology: Topology, points: Array, threads: int, edges: Mask | None = None) -> tuple[Array, Array]:
+    """Return the unit normals that vertices (k, 3) and elements (m, 3) have by what is around them; 0: it tells none.
 
-    The stars of vertices on sharp edges (k,) tell nothing of what is beside them.
+    They are those of the area, as a vector, of the stars of a vertex and its neighbours; of an element the sum of its
+    vertices'. The stars of vertices on sharp edges (k,) tell nothing of what is beside them.
     """
-    offsets, nodes = rows_of_elements(topology)
-    m, k = len(areas), len(topology.connectivity.vertices)
-    owners = np.repeat(np.arange(m, dtype=np.int32), np.diff(offsets))
-    edges = np.zeros(k, dtype=bool) if edges is None else edges
-    of_stars = kernels.summed(nodes, areas, k, owners)
-    of_stars[edges] = 0.0
-    start, end = topology.edges()
-    for _ in range(RINGS):
-        of_stars = of_stars + kernels.summed(start, of_stars, k, end) + kernels.summed(end, of_stars, k, start)
-        of_stars[edges] = 0.0
-    return of_stars, kernels.summed(owners, of_stars, m, nodes)
+    edges = np.zeros(len(points), dtype=bool) if edges is None else edges
+    return kernels.normals_around(points, *rows_of_elements(topology), topology.stars(threads), edges, threads)
 
 
 def rows_of_elements(topology: Topology) -> tuple[Numbers, Numbers]:

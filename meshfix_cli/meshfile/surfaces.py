@@ -28,6 +28,7 @@ def on_surface(
     interfaces: bool = True,
     reference: NDArray[np.float64] | None = None,
     threads: int = 1,
+    with_shape: bool = True,
 ) -> Document:
     """Return a document of a surface whose vertices slide on it; see `surface.laid_out`.
 
@@ -41,8 +42,9 @@ def on_surface(
     interfaces : bool
         Whether that holds for the curves between regions as well.
     reference : (k, d) float64, optional
-        See `laid_out`.
     threads : int
+    with_shape : bool
+        See `laid_out`.
     """
     mesh, topology = document.mesh, document.mesh.topology
     labels = joint(topology.m, *document.regions) if document.regions else np.zeros(topology.m, dtype=np.int64)
@@ -53,7 +55,7 @@ def on_surface(
             continue
         held |= mask
     kept = Kept(labels[topology.connectivity.rows], cells.lines, mesh.along_curve(held), smooth, slide)
-    return laid_as(document, laid_out(mesh, kept, reference, threads))
+    return laid_as(document, laid_out(mesh, kept, reference, threads, with_shape=with_shape))
 
 
 def laid_as(document: Document, mesh: Mesh) -> Document:

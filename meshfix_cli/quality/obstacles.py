@@ -133,7 +133,7 @@ def _of_surface(mesh: Mesh, threads: int) -> Obstacles:
     surface = mesh.surface
     if surface is not None and surface.kept is not None and not surface.has_reference:
         from meshfix_cli.mesh.sides import facets_of
-        from meshfix_cli.mesh.surface import ends
+        from meshfix_cli.mesh.tangle import ends
 
         # Others that do not move are on features, which a tangle may feign.
         held = np.append(ends(mesh), True)  # -1: no more vertices

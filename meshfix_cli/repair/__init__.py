@@ -175,13 +175,16 @@ class Method:
     max_deviation: Distance = MAX_DEVIATION
     curving: Curving = "hold"
 
-    def freed(self, document: Document, reference: NDArray[np.float64] | None = None) -> Document:
+    def freed(
+        self, document: Document, reference: NDArray[np.float64] | None = None, with_shape: bool = True
+    ) -> Document:
         """Return a document in which vertices may slide, if they are to.
 
         `reference`: see `untangle.steps`; not where the boundary was displaced, which says where it is to be.
+        `with_shape`: see `surface.laid_out`; `solve` gives surfaces theirs.
         """
         if document.mesh.surface is not None:
-            return self.on_surface(document, reference)
+            return self.on_surface(document, reference, with_shape=with_shape)
         if self.slide == "none" or document.mesh.quadratic is not None:  # corners and nodes would part
             return document
         from meshfix_cli.meshfile.sliding import slid
@@ -190,13 +193,17 @@ class Method:
         return slid(document, self.slide_interfaces, reference, smooth=smooth)
 
     def on_surface(
-        self, document: Document, reference: NDArray[np.float64] | None = None, threads: int = 1
+        self,
+        document: Document,
+        reference: NDArray[np.float64] | None = None,
+        threads: int = 1,
+        with_shape: bool = True,
     ) -> Document:
-        """Return a document of a surface in which vertices slide on it, as they always do."""
+        """Return a document of a surface in which vertices slide on it, as they always do; see `surface.laid_out`."""
         from meshfix_cli.meshfile.surfaces import on_surface
 
         smooth = self._smooth(document, reference)
-        return on_surface(document, smooth, self.slide, self.slide_interfaces, reference, threads)
+        return on_surface(document, smooth, self.slide, self.slide_interfaces, reference, threads, with_shape)
 
     def _smooth(self, document: Document, reference: NDArray[np.float64] | None) -> curved.Smooth:
         from meshfix_cli.mesh.curved import Smooth
@@ -242,15 +249,15 @@ class Method:
     ) -> Outcome:
         """Run them to the end; `watch` passes the steps through, to show them."""
         from meshfix_cli.quality.obstacles import find_obstacles
-        from meshfix_cli.solve.records import Outcome
-        from meshfix_cli.solve.untangle import drain
+        from meshfix_cli.solve.records import Outcome, drain
 
         if mesh.quadratic is not None:  # what is impossible may change, as its boundary may
             found = drain(watch(self._curved_steps(mesh, reach, threads, reference)))
             return Outcome(*found, find_obstacles(found[2], threads))
         if mesh.surface is not None:  # what a fold feigns to be features is free in the end
-            found = drain(watch(self._surface_steps(mesh, reach, threads)))
-            return Outcome(*found, find_obstacles(found[2], threads))
+            from meshfix_cli.solve.surface import solved
+
+            return solved(watch(self._surface_steps(mesh, reach, threads)), threads)
         obstacles = find_obstacles(mesh, threads)
         run = self.steps(mesh, reach, threads, obstacles.hopeless(mesh), reference=reference)
         return Outcome(*drain(watch(run)), obstacles)
@@ -371,7 +378,7 @@ def _solved(
     if document.mesh.quadratic is not None:
         return document, solve(document.mesh, reach), method.without_effect(document.mesh)
     shape = reference if document.displaced is None else None
-    freed = method.freed(document, shape)
+    freed = method.freed(document, shape, with_shape=False)
     outcome = solve(freed.mesh, reach)
     notes: tuple[str, ...] = ()
     rounded = 0  # elements that rounding has inverted: then less may be better also where it is valid
@@ -379,7 +386,7 @@ def _solved(
         left, rounded = outcome.records[-1].inverted, rounded or freed.first_valid_as_stored(outcome.after)[1]
         if not (left or rounded):
             break
-        other = replace(method, slide=slide).freed(document, shape)
+        other = replace(method, slide=slide).freed(document, shape, with_shape=False)
         instead = solve(other.mesh, reach)
         if _rank(other, instead) < _rank(freed, outcome):
             freed, outcome = other, instead

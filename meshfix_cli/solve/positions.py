@@ -160,9 +160,17 @@ class Positions:
         return self.free & self.team.grown(vertices, rings)
 
     def _relocated(
-        self, points: Array, move: Move, states: NDArray[np.uint8], threshold_sine2: float | None = None
+        self,
+        points: Array,
+        move: Move,
+        states: NDArray[np.uint8],
+        threshold_sine2: float | None = None,
+        ahead: Array | None = None,
     ) -> Array:
-        """Return the points (k, d) after a sweep, which keeps account in `states`; the threshold is the user's."""
+        """Return the points (k, d) after a sweep, which keeps account in `states`; the threshold is the user's.
+
+        On a surface vertices may be given places ahead (k, 3) to which they go as far as that is good.
+        """
         threshold_sine2 = self.threshold_sine2 if threshold_sine2 is None else threshold_sine2
         points = points.copy()
         freedom = None if self.freedom is None else self.freedom.kernel
@@ -175,7 +183,7 @@ class Positions:
                 kernels.relocate(*given, freedom)
             else:
                 assert freedom is not None
-                kernels.relocate_on_surface(*given, freedom, self.surface.normals)
+                kernels.relocate_on_surface(*given, freedom, self.surface.normals, ahead)
         return points
 
     def _min_sine2(self, elements: Judged) -> float:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from meshfix_cli.solve.strategies import SMOOTHING
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
@@ -87,6 +90,20 @@ class Outcome:
         """All is judged, no element is inverted, by its shape or its numbering, and no boundary crosses itself."""
         inverted = self.records[-1].inverted or self.after.topology.misnumbered.any()
         return self.all_judged and not (inverted or self.obstacles)
+
+
+def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tuple[SweepRecord, ...]]:
+    """Take all steps; return the mesh as it came, untangled and smoothed, and the records."""
+    run = iter(run)
+    mesh, record = next(run)
+    before = untangled = mesh
+    records, smooths = [record], False
+    for mesh, record in run:
+        smooths = smooths or record.phase.startswith(SMOOTHING)  # also where it goes back to the best
+        if not smooths:
+            untangled = mesh
+        records.append(record)
+    return before, untangled, mesh, tuple(records)
 
 
 class Clock:

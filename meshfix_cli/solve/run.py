@@ -48,9 +48,11 @@ GOAL_RINGS = 4  # around the elements below the goal that are smoothed
 GOAL_RISE = 0.1  # degrees by which the smallest angle must rise, in `GOAL_PATIENCE` turns through the moves, to go on
 GOAL_PATIENCE = 2
 ON_INVALID_STARS = (Move.UNTANGLE_HEIGHTS, Move.UNTANGLE_COEFFICIENTS, Move.UNTANGLE_MOST)
+WILL_DO_RISE = 0.2  # degrees in one turn, of a surface that has no angle below the threshold: vertices creep along it
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 LET_DOWN = 0.8  # of the smallest angle of a surface, to which the first of these may take it
+AHEAD = 1.5  # times the way of the last turn through the moves: so far vertices of a surface try to go on
 SURFACE_SWEEPS = 20  # for the mean ratios, where a plane or solid mesh has one energy of all elements
 CORNER_KEPT = 0.3  # of the smallest that untangling left: scaled Jacobians do not mind edges that shrink to nothing
 SAME = 0.1  # degrees: of two starts with the same smallest angle, the one of the larger mean is better
@@ -421,16 +423,21 @@ class Run(Positions):
         self.uneven = True
         while True:
             below, smallest = self.team.total(int((angles < goal)[self.own].sum())), self._least(angles)
-            rises = below < self.pace.left * fewest or smallest > largest + math.radians(GOAL_RISE)
+            will_do = self.surface is not None and phase.until == "threshold" and smallest >= self.threshold
+            rise, patience = (WILL_DO_RISE, 1) if will_do else (GOAL_RISE, GOAL_PATIENCE)
+            rises = below < self.pace.left * fewest or smallest > largest + math.radians(rise)
             fewest, largest, waited = min(fewest, below), max(largest, smallest), 0 if rises else waited + 1
-            if below == 0 or waited == GOAL_PATIENCE:
+            if below == 0 or waited >= patience:
                 return
             due = near & self._grown(self._of(angles < goal), GOAL_RINGS) & self.team.own_vertices
-            states, last = _due(due), phase.moves[0]
+            states, last, start = _due(due), phase.moves[0], self.points
             for move in phase.moves:
                 states, last = states if move is last else _due(due), move
                 floor = self._min_sine2(self.mendable) if move is Move.MEAN_RATIO else math.sin(goal) ** 2
                 yield self._relocated(self.points, move, states, floor)
+            if self.surface is not None:  # vertices creep along it: as far again as they have come, and farther
+                ahead = self.points + AHEAD * (self.points - start)
+                yield self._relocated(self.points, phase.moves[0], _due(due), math.sin(goal) ** 2, ahead)
             angles = self._angles(self.points)
 
     def _raisings(self, move: Move, near: Mask) -> Iterator[Array]:

@@ -10,17 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from meshfix_cli.mesh.surface import (
-    feigned,
-    in_planes,
-    laid_out,
-    meets_features,
-    normals_of_vertices,
-    on_edges,
-    seen,
-    tangled,
-)
-from meshfix_cli.mesh.topology import read_only
+from meshfix_cli.mesh.surface import in_planes, laid_out, seen
+from meshfix_cli.mesh.tangle import Tangle, normals_of_vertices
+from meshfix_cli.quality.obstacles import find_obstacles
+from meshfix_cli.quality.summary import summarise
+from meshfix_cli.solve.records import Outcome, drain
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
@@ -36,13 +30,13 @@ def surface_steps(
 ) -> Steps:
     """Yield a surface and a record, as it came and after each sweep; see `untangle.steps`.
 
-    Where there is no reference, what a tangle feigns to be features is found out once it is gone: then vertices slide
-    on what is left, once more where that frees some.
+    Where there is no reference, a tangle is undone in planes, and the vertices go back to the surface that all of them
+    were on.
 
     Parameters
     ----------
     mesh : Mesh
-        As `surface.laid_out` gives it.
+        As `surface.laid_out` gives it, whether or not with a shape.
     untangle, smooth : callable
         Run the phases that untangle, and all of them.
     reach : float
@@ -51,57 +45,68 @@ def surface_steps(
     """
     surface = mesh.surface
     assert surface is not None and surface.kept is not None
-    inverted = mesh.check(threads)[0]
-    if surface.has_reference or inverted == 0 or reach < math.inf:
+    inverted, smallest = mesh.check(threads)
+    if surface.has_reference or inverted == 0:
         yield from smooth(mesh)
         return
+    tangle = Tangle.of(mesh, threads)
+    if reach < math.inf:
+        yield from smooth(laid_out(mesh, surface.kept, threads=threads, tangle=tangle))
+        return
     best, first = mesh, True
-    region = tangled(mesh, threads)
-    edges = on_edges(mesh, region)
     for _ in range(ROUNDS):
-        flat = moved = in_planes(best, region, edges, threads)
+        flat = moved = in_planes(best, tangle, threads)
         for moved, record in untangle(flat):
-            if first or record.phase != "input":
+            if first:  # as it is seen, not in these planes
+                yield mesh, replace(record, inverted=inverted, min_measure=smallest)
+            elif record.phase != "input":
                 yield _as_before(moved, mesh), record
             first = False
-        now = _laid_on_sample(moved, flat, mesh, region, threads)
+        now, around = _laid_on_sample(moved, flat, mesh, tangle, threads)
         left = now.check(threads)[0]
         if left >= inverted:
             break
-        best, inverted = now, left
-        region |= tangled(best, threads)
+        best, tangle, inverted = now, around.without_doubtful(now, threads), left
         if left == 0:
             break
-    for _ in range(ROUNDS):
-        if inverted == 0 and (odd := feigned(best, region)).any():
-            yield from (found := _Last(smooth(_only(in_planes(best, region, edges, threads), odd))))
-            best = _laid_on_sample(found.mesh, best, mesh, region, threads)
-        yield from (found := _Last(smooth(best)))
-        if inverted or not meets_features(best, region):
-            return
-        best = laid_out(seen(found.mesh, threads), surface.kept, threads=threads, region=region)
-        if not feigned(best, region).any():
-            return
+    if best is mesh:
+        best = laid_out(mesh, surface.kept, threads=threads, tangle=tangle)
+    for moved, record in smooth(best):
+        if record.phase != "input":
+            yield moved, record
 
 
-class _Last:
-    """The steps of a run but for the first, and the last mesh of them."""
+def solved(run: Steps, threads: int) -> Outcome:
+    """Take all steps of a surface.
 
-    def __init__(self, run: Steps) -> None:
-        self._run = run
-        self.mesh: Mesh
+    Without a reference each of its meshes is seen as it is by itself, not from where it was while vertices moved; what
+    is worse so than the first is not taken.
+    """
+    before, untangled, after, records = drain(run)
+    assert before.surface is not None
+    if not before.surface.has_reference:
+        untangled, after = (one if one is before else _seen_as_it_is(one, threads) for one in (untangled, after))
+    if after is not before:
+        (left, measure), at_first = after.check(threads), records[0].inverted
+        worse = left > at_first or (left == at_first > 0 and _rank(after, threads) > _rank(before, threads))
+        if worse:
+            after, left, measure = before, at_first, records[0].min_measure
+        if worse or left != records[-1].inverted:
+            record = replace(records[-1], phase="best", inverted=left, min_measure=measure, moved=0, seconds=0.0)
+            records = (*records, record)
+    return Outcome(before, untangled, after, records, find_obstacles(after, threads))
 
-    def __iter__(self) -> Steps:
-        for mesh, record in self._run:
-            self.mesh = mesh
-            if record.phase != "input":
-                yield mesh, record
+
+def _seen_as_it_is(mesh: Mesh, threads: int) -> Mesh:
+    here = seen(mesh, threads).surface
+    assert here is not None and mesh.surface is not None
+    return replace(mesh, surface=replace(mesh.surface, normals=here.normals))
 
 
-def _only(mesh: Mesh, vertices: Mask) -> Mesh:
-    """Return a mesh of which some vertices (k,) and their neighbours move, as far as they may."""
-    near = mesh.topology.stars().grown(vertices, 1).view(bool)
-    return replace(mesh, movable=read_only(mesh.movable & mesh.topology.of_vertices(near)))
+def _rank(mesh: Mesh, threads: int) -> tuple[int, int, float]:
+    """Return how good a surface is: the smaller the better."""
+    summary = summarise(mesh, threads=threads)
+    return summary.inverted, summary.folded, -summary.smallest
 
 
 def _as_before(moved: Mesh, mesh: Mesh) -> Mesh:
@@ -109,13 +114,15 @@ def _as_before(moved: Mesh, mesh: Mesh) -> Mesh:
     return replace(moved, freedom=mesh.freedom, movable=mesh.movable)
 
 
-def _laid_on_sample(moved: Mesh, before: Mesh, first: Mesh, region: Mask, threads: int) -> Mesh:
-    """Return a mesh of which the vertices that have moved are on the surface that all of them were on at first."""
-    from meshfix_cli.solve.refit import refitted
+def _laid_on_sample(moved: Mesh, before: Mesh, first: Mesh, tangle: Tangle, threads: int) -> tuple[Mesh, Tangle]:
+    """Return a mesh of which the vertices that have moved are on the surface that all of them were on at first.
 
+    With it the tangle, of which these are a part.
+    """
     assert first.surface is not None and first.surface.kept is not None
-    there, here, sample = (one.along_curve(one.points) for one in (moved, before, first))
-    rows = np.flatnonzero((there != here).any(axis=1))
-    normals, seen_at_first = (normals_of_vertices(one, threads) for one in (moved, first))
-    there = refitted(there, rows, normals, sample, seen_at_first, threads)
-    return laid_out(seen(moved.with_vertices(there), threads), first.surface.kept, threads=threads, region=region)
+    there, here = (one.along_curve(one.points) for one in (moved, before))
+    gone = (there != here).any(axis=1)
+    there = tangle.refitted(there, np.flatnonzero(gone), normals_of_vertices(moved, threads), threads)
+    tangle = tangle.with_moved(gone, first, threads)
+    mesh = laid_out(seen(moved.with_vertices(there), threads), first.surface.kept, threads=threads, tangle=tangle)
+    return mesh, tangle

@@ -14,13 +14,12 @@ from numpy.typing import NDArray
 
 from meshfix_cli.mesh.reference import reference_points
 from meshfix_cli.quality.obstacles import find_obstacles
-from meshfix_cli.solve.records import Outcome, SweepRecord
+from meshfix_cli.solve.records import Outcome, SweepRecord, drain
 from meshfix_cli.solve.run import Run
 from meshfix_cli.solve.strategies import (
     FEATURE_ANGLE,
     MAX_DEVIATION,
     SMOOTH,
-    SMOOTHING,
     SWEEPS,
     THRESHOLD,
     Phase,
@@ -140,20 +139,6 @@ def steps(
         yield run.mesh, run.record
 
 
-def drain(run: Iterable[tuple[Mesh, SweepRecord]]) -> tuple[Mesh, Mesh, Mesh, tuple[SweepRecord, ...]]:
-    """Take all steps; return the mesh as it came, untangled and smoothed, and the records."""
-    run = iter(run)
-    mesh, record = next(run)
-    before = untangled = mesh
-    records, smooths = [record], False
-    for mesh, record in run:
-        smooths = smooths or record.phase.startswith(SMOOTHING)  # also where it goes back to the best
-        if not smooths:
-            untangled = mesh
-        records.append(record)
-    return before, untangled, mesh, tuple(records)
-
-
 def untangle(
     mesh: Mesh,
     strategy: str = "auto",
@@ -210,7 +195,7 @@ def untangle(
     if mesh.surface is not None:
         from meshfix_cli.mesh import curved
         from meshfix_cli.mesh.surface import laid_by_default
-        from meshfix_cli.solve.surface import surface_steps
+        from meshfix_cli.solve.surface import solved, surface_steps
 
         def sweeping(smooth: Smooth, surface: Mesh) -> Iterator[tuple[Mesh, SweepRecord]]:
             return steps(
@@ -220,8 +205,7 @@ def untangle(
 
         shape = curved.Smooth(FEATURE_ANGLE, MAX_DEVIATION * mesh.mean_edge_length(threads))
         laid = laid_by_default(mesh, shape, places, threads)
-        found = drain(surface_steps(laid, partial(sweeping, 0), partial(sweeping, smooth), max_move, threads))
-        return Outcome(*found, find_obstacles(found[2], threads))
+        return solved(surface_steps(laid, partial(sweeping, 0), partial(sweeping, smooth), max_move, threads), threads)
     phases = plan(strategy, smooth, only_invalid, reference is not None)
     obstacles = find_obstacles(mesh, threads)
     run = steps(

@@ -25,9 +25,8 @@ from meshfix_cli.mesh.mixed import MixedTopology
 from meshfix_cli.mesh.topology import Topology, distinct
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.repair import Method
-from meshfix_cli.solve.records import Outcome, RankRecord, SweepRecord
+from meshfix_cli.solve.records import Outcome, RankRecord, SweepRecord, drain
 from meshfix_cli.solve.team import rank_of
-from meshfix_cli.solve.untangle import drain
 
 if TYPE_CHECKING:
     from pathlib import Path

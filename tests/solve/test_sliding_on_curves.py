@@ -19,8 +19,9 @@ from meshfix_cli.mesh.mesh import Mesh
 from meshfix_cli.quality.summary import change_of_shape, summarise
 from meshfix_cli.repair import Method
 from meshfix_cli.solve.perturb import Distance, perturb
+from meshfix_cli.solve.records import drain
 from meshfix_cli.solve.strategies import Move, plan
-from meshfix_cli.solve.untangle import drain, steps
+from meshfix_cli.solve.untangle import steps
 
 Points = NDArray[np.float64]
 

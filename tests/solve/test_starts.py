@@ -15,8 +15,9 @@ from meshfix_cli.quality.formulas import evaluate
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.solve.passes import Passes
 from meshfix_cli.solve.positions import GAIN
+from meshfix_cli.solve.records import drain
 from meshfix_cli.solve.strategies import PASSES, SMOOTHING, STRATEGIES, THRESHOLD, Move, Phase, plan
-from meshfix_cli.solve.untangle import drain, steps
+from meshfix_cli.solve.untangle import steps
 
 
 def collapsed(name: str) -> tuple[Mesh, Mesh]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import surface_bodies
 from surface_measures import folds
-from surfaces import Array, Rows, box, bumps, height, laid, off_torus, tangled, torus
+from surfaces import Array, Rows, box, bumps, height, laid, off_torus, spoiled, tangled, torus
 
 from meshfix_cli.mesh.curved import Smooth
 from meshfix_cli.mesh.mesh import Mesh
@@ -53,6 +53,34 @@ def test_what_is_tangled_along_a_surface_is_untangled_with_a_reference(body: str
         on_sides = ((points == 0) | (points == 6)).any(axis=1)
         kept = (points == 0) | (points == 6)
         assert on_sides.all() and (outcome.after.points[kept] == points[kept]).all()
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_a_small_surface_gets_no_worse(seed: int) -> None:
+    """Nor as it is seen afterwards, by itself: vertices coincide, lie on others' edges, or have left."""
+    points, rows = spoiled(np.random.default_rng(seed))
+    mesh = Mesh.build(points, rows)
+    outcome = untangle(mesh)
+    here, there = (summarise(Mesh.build(one.points, rows)) for one in (mesh, outcome.after))
+    assert here.inverted == outcome.records[0].inverted and there.inverted == outcome.records[-1].inverted
+    assert (there.inverted, there.inverted and there.folded) <= (here.inverted, here.folded)
+    if there.inverted == here.inverted:
+        assert there.min_angle >= here.min_angle - 1e-6
+    if here.inverted == 0:
+        assert outcome.valid
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("body", ["ellipsoid", "torus", "bumps", "cylinder", "part"])
+def test_without_a_reference_a_tangle_leaves_no_fold_and_edges_where_they_are(body: str, seed: int) -> None:
+    whole = surface_bodies.BODIES[body]()
+    folded = surface_bodies.tangled(whole, 25, 1.5, seed + 4)
+    assert folds(whole, folded.points) > 500
+    outcome = untangle(Mesh.build(folded.points, folded.cells))
+    after = outcome.after.points
+    assert outcome.valid and folds(whole, after) == 0
+    held = whole.of_points == surface_bodies.HELD
+    np.testing.assert_array_equal(after[held], folded.points[held])
 
 
 @pytest.mark.parametrize("body", ["torus", "bumps"])

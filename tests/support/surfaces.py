@@ -126,3 +126,19 @@ def tangled(points: Array, rows: Rows, seed: int = 0) -> Array:
     """Return the points with 25 % of all moved along the surface by 1.5 edges, those inside of its patches."""
     mesh = laid(points, rows)
     return perturb(mesh, 25, 1.5 * mesh.mean_edge_length(), seed)[0].points
+
+
+def spoiled(random: np.random.Generator) -> tuple[Array, Rows]:
+    """Return a small surface, closed or open, some points of which are where others are, or between two, or astray."""
+    which = random.integers(3)
+    if which == 0:
+        points, rows = box(int(random.integers(1, 4)), triangles=True)
+    elif which == 1:
+        points, rows = bumps(int(random.integers(2, 6)))
+    else:
+        points = np.array([[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+        rows = np.array([[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]], dtype=np.int32)
+    for row in random.choice(len(points), int(random.integers(1, 2 + len(points) // 4)), replace=False):
+        one, other = points[random.integers(len(points), size=2)]
+        points[row] = (one, (one + other) / 2, points[row] + 0.5 * random.standard_normal(3))[random.integers(3)]
+    return points, rows

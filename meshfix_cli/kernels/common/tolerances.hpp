@@ -59,6 +59,11 @@ constexpr double ON_PIECE = -1e-10;
 // tells more than these.
 constexpr double QUADRIC_RIDGE = 1e-9;
 constexpr int QUADRIC_LEAST = 7;
+constexpr double QUADRIC_SAME2 = 1e-18;  // squared distance, of the largest, up to which a point is the place itself
+
+// Areas as vectors, of all that is around a vertex: what their sum is less than, of the products of edges, is rounding, as that
+// of something closed.
+constexpr double AREA_AROUND = 1e-12;
 
 // Of the square of how far facets are from their shapes: what draws a vertex back makes it as much smaller.
 constexpr double DRAWN_BACK = 0.9;

@@ -19,6 +19,12 @@ class Nearness {
    public:
     Nearness(const double* points, const Parameters& parameters) : points_(points), parameters_(parameters) {}
 
+    // The piece of a shape on which the vertex is at x: where it is none of its own, searches for what is around it begin there.
+    void begin_at(std::int32_t shape, std::int64_t piece) {
+        shape_ = shape;
+        piece_ = piece;
+    }
+
     // Whether there are facets around a vertex that must stay near a shape.
     bool is_bounded(std::int64_t v) const {
         const std::int32_t* offsets = parameters_.freedom->around_offsets;
@@ -62,19 +68,26 @@ class Nearness {
     template <class F>
     bool for_each_middle(std::int64_t v, const Vec<D>& x, const F& look) const {
         const Freedom& freedom = *parameters_.freedom;
-        for (std::int32_t i = freedom.around_offsets[v]; i < freedom.around_offsets[v + 1]; ++i) {
-            const std::int32_t* row = freedom.around + 4 * static_cast<std::int64_t>(i);
+        const std::int32_t begin = freedom.around_offsets[v], end = freedom.around_offsets[v + 1];
+        const auto row_at = [&](std::int32_t i) { return freedom.around + 4 * static_cast<std::int64_t>(i); };
+        bool has_left = shape_ >= 0;
+        for (std::int32_t i = begin; i < end && has_left; ++i) has_left = row_at(i)[3] != piece_;
+        for (std::int32_t i = begin; i < end; ++i) {
+            const std::int32_t* row = row_at(i);
+            const auto piece = static_cast<std::int32_t>(has_left && row[2] == shape_ ? piece_ : row[3]);
             const Vec<D> a = load<D>(points_ + static_cast<std::int64_t>(row[0]) * D);
-            if (!look(0.5 * (x + a), row[2], row[3])) return false;
+            if (!look(0.5 * (x + a), row[2], piece)) return false;
             if (row[1] < 0) continue;
             const Vec<D> b = load<D>(points_ + static_cast<std::int64_t>(row[1]) * D);
-            if (!look((1.0 / 3.0) * (x + a + b), row[2], row[3])) return false;
+            if (!look((1.0 / 3.0) * (x + a + b), row[2], piece)) return false;
         }
         return true;
     }
 
     const double* points_;
     const Parameters& parameters_;
+    std::int32_t shape_ = -1;  // none
+    std::int64_t piece_ = Reference::ANY;
 };
 
 }  // namespace meshfix

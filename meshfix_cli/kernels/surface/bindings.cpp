@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "mesh/python.hpp"
+#include "surface/around.hpp"
 #include "surface/joints.hpp"
 #include "surface/refit.hpp"
 #include "surface/relocate.hpp"
@@ -44,10 +45,23 @@ auto area_vectors_py(const Matrix<const double>& points, const Int32s& offsets, 
     return to_numpy(unlocked([&] { return area_vectors(points.data(), elements, threads); }), 3);
 }
 
+auto normals_around_py(const Matrix<const double>& points, const Int32s& offsets, const Int32s& nodes, const PyConnectivity& self,
+                       const Vector<const bool>& edges, int threads) {
+    const std::int64_t n = self.mesh.n();
+    if (!self.has_stars) throw nb::value_error("the stars are not built");
+    if (static_cast<std::int64_t>(points.shape(0)) != n || points.shape(1) != 3 || static_cast<std::int64_t>(edges.shape(0)) != n)
+        throw nb::value_error("the points are of another mesh");
+    const ElementsView elements = flat_elements(offsets, nodes);
+    AroundNormals found = unlocked([&] {
+        return normals_around(points.data(), elements, stars_of(self.mesh), n, reinterpret_cast<const std::uint8_t*>(edges.data()), threads);
+    });
+    return std::make_pair(to_numpy(std::move(found.of_vertices), 3), to_numpy(std::move(found.of_elements), 3));
+}
+
 auto relocate_on_surface_py(int move, const Matrix<double>& points, const Vector<std::uint8_t>& states,
                             const PyConnectivity& self, const Int32s& blocks, double threshold_sine2, double min_measure,
                             const Matrix<const double>& start, double max_move, int threads, const Freedom& freedom,
-                            const Matrix<const double>& normals) {
+                            const Matrix<const double>& normals, const std::optional<Matrix<const double>>& ahead) {
     const Connectivity& mesh = self.mesh;
     if (!self.has_stars) throw nb::value_error("the stars are not built");
     for (const auto& some : {points.shape(0), start.shape(0), states.shape(0)})
@@ -55,13 +69,18 @@ auto relocate_on_surface_py(int move, const Matrix<double>& points, const Vector
     if (points.shape(1) != 3 || start.shape(1) != 3 || self.dimension != 2) throw nb::value_error("this is no surface");
     if (static_cast<std::int64_t>(normals.shape(0)) != mesh.m() || normals.shape(1) != 3)
         throw nb::value_error("the normals are of another mesh");
+    if (ahead && (static_cast<std::int64_t>(ahead->shape(0)) != mesh.n() || ahead->shape(1) != 3))
+        throw nb::value_error("the places ahead are of another mesh");
     check_freedom(&freedom, mesh.n());
     const Sweep sweep{stars_of(mesh), points.data(), states.data(), mesh.n(),
                       Parameters{threshold_sine2, 2.0 * min_measure, start.data(), max_move, &freedom}};
     const Counts counts = unlocked([&] {
         return relocate<SurfaceRelocation>(static_cast<Move>(move), sweep, blocks.data(),
                                            static_cast<std::int64_t>(blocks.shape(0)), threads,
-                                           [&](SurfaceRelocation& work) { work.normals = normals.data(); });
+                                           [&](SurfaceRelocation& work) {
+                                               work.normals = normals.data();
+                                               work.ahead = ahead ? ahead->data() : nullptr;
+                                           });
     });
     return std::make_pair(counts.visited, counts.moved);
 }
@@ -164,19 +183,48 @@ auto edge_lengths_py(const Matrix<const double>& points, const PyConnectivity& s
     }));
 }
 
-void refit_py(const Matrix<double>& points, const Int32s& rows, const Matrix<const double>& normals, const Matrix<const double>& sample,
-              const Matrix<const double>& seen, double smooth, int threads) {
-    for (const auto& some : {points.shape(1), normals.shape(1), sample.shape(1), seen.shape(1)})
-        if (some != 3) throw nb::value_error("these are no points in space");
-    check_vectors(points.shape(0), normals.shape(0));
-    check_vectors(sample.shape(0), seen.shape(0));
-    if (sample.shape(0) == 0) throw nb::value_error("there is no sample");
-    unlocked([&] {
-        refit(points.data(), rows.data(), static_cast<std::int64_t>(rows.shape(0)), normals.data(), sample.data(), seen.data(),
-              static_cast<std::int64_t>(sample.shape(0)), smooth, threads);
-        return 0;
-    });
-}
+// Points (n, 3) of a surface, and unit normals there, which are kept.
+class PySample {
+   public:
+    PySample(const Matrix<const double>& points, const Matrix<const double>& seen)
+        : points_(points), seen_(seen), tree_(unlocked([&] {
+              check(points);
+              check(seen);
+              check_vectors(points.shape(0), seen.shape(0));
+              if (points.shape(0) == 0) throw nb::value_error("there is no sample");
+              return Sample(points.data(), static_cast<std::int64_t>(points.shape(0)));
+          })) {}
+
+    void refit(const Matrix<double>& points, const Int32s& rows, const Matrix<const double>& normals, double smooth, int threads) const {
+        check(points);
+        check(normals);
+        check_vectors(points.shape(0), normals.shape(0));
+        unlocked([&] {
+            meshfix::refit(points.data(), rows.data(), static_cast<std::int64_t>(rows.shape(0)), normals.data(), tree_, points_.data(),
+                           seen_.data(), smooth, threads);
+            return 0;
+        });
+    }
+
+    auto left(const Matrix<const double>& places, const Matrix<const double>& normals, int threads) const {
+        check(places);
+        check(normals);
+        check_vectors(places.shape(0), normals.shape(0));
+        const auto count = static_cast<std::int64_t>(places.shape(0));
+        return to_numpy(unlocked([&] {
+            return left_by_quadrics(tree_, points_.data(), seen_.data(), places.data(), normals.data(), count, threads);
+        }), 2);
+    }
+
+   private:
+    template <class M>
+    static void check(const M& some) {
+        if (some.shape(1) != 3) throw nb::value_error("these are no points in space");
+    }
+
+    Matrix<const double> points_, seen_;
+    Sample tree_;
+};
 
 // Marks the vertices on the reference that are farther from it than a bound.
 auto off_reference_py(const Freedom& self, const Matrix<const double>& points, double bound, int threads) {
@@ -205,9 +253,11 @@ void bind_surface(nb::module_& m) {
           "normals"_a.noconvert(), "threads"_a);
     m.def("area_vectors", &area_vectors_py, "points"_a.noconvert(), "offsets"_a.noconvert(), "nodes"_a.noconvert(),
           "threads"_a);
+    m.def("normals_around", &normals_around_py, "points"_a.noconvert(), "offsets"_a.noconvert(), "nodes"_a.noconvert(), "mesh"_a,
+          "edges"_a.noconvert(), "threads"_a);
     m.def("relocate_on_surface", &relocate_on_surface_py, "move"_a, "points"_a.noconvert(), "states"_a.noconvert(),
           "mesh"_a, "blocks"_a.noconvert(), "threshold_sine2"_a, "min_measure"_a, "start"_a.noconvert(), "max_move"_a,
-          "threads"_a, "freedom"_a, "normals"_a.noconvert());
+          "threads"_a, "freedom"_a, "normals"_a.noconvert(), "ahead"_a.noconvert() = nb::none());
     m.def("unit_vectors", &unit_vectors_py, "vectors"_a.noconvert());
     m.def("summed", &summed_py, "group"_a.noconvert(), "vectors"_a.noconvert(), "groups"_a, "rows"_a.noconvert() = nb::none());
     m.def("dots_between", &dots_between_py, "vectors"_a.noconvert(), "pairs"_a.noconvert());
@@ -220,8 +270,10 @@ void bind_surface(nb::module_& m) {
     m.def("rows_of_pairs", &rows_of_pairs_py, "pairs"_a.noconvert(), "n"_a);
     m.def("pairs_from", &pairs_from_py, "edges"_a.noconvert(), "marks"_a.noconvert());
     m.def("edge_lengths", &edge_lengths_py, "points"_a.noconvert(), "mesh"_a);
-    m.def("refit", &refit_py, "points"_a.noconvert(), "rows"_a.noconvert(), "normals"_a.noconvert(), "sample"_a.noconvert(),
-          "seen"_a.noconvert(), "smooth"_a, "threads"_a);
+    nb::class_<PySample>(m, "Sample")
+        .def(nb::init<const Matrix<const double>&, const Matrix<const double>&>(), "points"_a.noconvert(), "seen"_a.noconvert())
+        .def("refit", &PySample::refit, "points"_a.noconvert(), "rows"_a.noconvert(), "normals"_a.noconvert(), "smooth"_a, "threads"_a)
+        .def("left", &PySample::left, "places"_a.noconvert(), "normals"_a.noconvert(), "threads"_a);
     m.def("off_reference", &off_reference_py, "freedom"_a, "points"_a.noconvert(), "bound"_a, "threads"_a);
 }
 

@@ -115,15 +115,19 @@ inline double fall(double r2) {
     return power;
 }
 
-// How far along a unit vector the quadric is from p, through the points that are seen from the same side; 0 where they form
-// none, by what is left of them: `smooth` of their distance.
-inline double height_of_quadric(const Sample& sample, const double* points, const double* seen, const Vec<3>& p, const Vec<3>& up,
-                                double smooth) {
+// The quadric near p over the plane of a unit vector, through the points that are seen from the same side. In units of the
+// distance of the farthest: how far along the vector it is, what it leaves of the points in the mean, infinite where they form
+// none; and how far p is from it, of what the farthest of the others is: on an edge as far, beside one less.
+struct Quadric {
+    double height = 0.0, left = INFINITY, share = 0.0, size = 0.0;
+};
+
+inline Quadric quadric_near(const Sample& sample, const double* points, const double* seen, const Vec<3>& p, const Vec<3>& up) {
     Sample::Near near;
     const int count = sample.nearest(p, near);
-    if (count < QUADRIC_LEAST) return 0.0;  // none, where p is not finite
+    if (count < QUADRIC_LEAST) return {};  // none, where p is not finite
     const double size = std::sqrt(near[count - 1].first), scale = 1.0 / size;
-    if (!(norm2(up) > 0.0 && size > 0.0)) return 0.0;
+    if (!(norm2(up) > 0.0 && size > 0.0)) return {};
     const Plane plane(up);
     std::array<std::array<double, 6>, 6> left{};
     std::array<double, 6> right{};
@@ -145,26 +149,41 @@ inline double height_of_quadric(const Sample& sample, const double* points, cons
         }
     }
     for (int j = 0; j < 6; ++j) left[j][j] += QUADRIC_RIDGE;
-    if (told < QUADRIC_LEAST || !solve_positive<6>(left, right, 0.0)) return 0.0;
-    double rest = 0.0, total = 0.0;
+    if (told < QUADRIC_LEAST || !solve_positive<6>(left, right, 0.0)) return {};
+    double rest = 0.0, total = 0.0, most = 0.0;
     for (int i = 0; i < count; ++i) {
         double off = heights[i];
         for (int j = 0; j < 6; ++j) off -= terms[i][j] * right[j];
         rest += weights[i] * off * off;
         total += weights[i];
+        if (near[i].first > QUADRIC_SAME2 * size * size) most = std::max(most, weights[i] * std::fabs(off));
     }
-    return rest < smooth * smooth * total && std::fabs(right[0]) < 1.0 ? size * right[0] : 0.0;
+    return {right[0], std::sqrt(rest / total), most > 0.0 ? std::fabs(right[0]) / most : 0.0, size};
 }
 
-// Moves some points (n, 3), by their rows, along unit normals (n, 3) to the surface.
-inline void refit(double* points, const std::int32_t* rows, std::int64_t count, const double* normals, const double* sample,
-                  const double* seen, std::int64_t samples, double smooth, int threads) {
-    const Sample tree(sample, samples);
+// Of some places (count, 3), with unit normals (count, 3): `left` and `share` of the quadrics near them (count, 2).
+inline std::vector<double> left_by_quadrics(const Sample& tree, const double* sample, const double* seen, const double* places,
+                                            const double* normals, std::int64_t count, int threads) {
+    std::vector<double> found(static_cast<std::size_t>(count) * 2);
+    for_each_range(count, 256, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
+        for (std::int64_t i = begin; i < end; ++i) {
+            const Quadric here = quadric_near(tree, sample, seen, load<3>(places + i * 3), load<3>(normals + i * 3));
+            found[2 * i] = here.left;
+            found[2 * i + 1] = here.share;
+        }
+    });
+    return found;
+}
+
+// Moves some points (n, 3), by their rows, along unit normals (n, 3) to the surface, where quadrics leave less than `smooth`.
+inline void refit(double* points, const std::int32_t* rows, std::int64_t count, const double* normals, const Sample& tree,
+                  const double* sample, const double* seen, double smooth, int threads) {
     for_each_range(count, 256, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
         for (std::int64_t i = begin; i < end; ++i) {
             double* here = points + static_cast<std::int64_t>(rows[i]) * 3;
             const Vec<3> p = load<3>(here), up = load<3>(normals + static_cast<std::int64_t>(rows[i]) * 3);
-            const double height = height_of_quadric(tree, sample, seen, p, up, smooth);
+            const Quadric found = quadric_near(tree, sample, seen, p, up);
+            const double height = found.left < smooth && std::fabs(found.height) < 1.0 ? found.size * found.height : 0.0;
             for (int k = 0; k < 3; ++k) here[k] = p[k] + height * up[k];
         }
     });

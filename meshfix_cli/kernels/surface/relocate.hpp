@@ -17,6 +17,7 @@ struct SurfaceRelocation {
     std::uint8_t* states;   // (n) HELD, DONE or DUE
     const double* normals;  // (elements, 3) of the side from which each is seen
     Parameters parameters;
+    const double* ahead = nullptr;  // (n, 3) where vertices go, as far as that is good; null: where their moves take them
 
     Star<2> star{};
     Programme<2> program{};
@@ -115,7 +116,8 @@ struct SurfaceRelocation {
     bool valid(const Vec<3>& p) const { return quality(p) > 0.0; }
 
     bool is_near(std::int64_t v, const Vec<3>& p) const {
-        const Nearness<3> nearness(points, parameters);
+        Nearness<3> nearness(points, parameters);
+        if (directions.curved()) nearness.begin_at(directions.shape, directions.piece);
         return nearness.is_bounded(v) ? nearness.is_near(v, p) : nearness.is_in_reach(v, p);
     }
 
@@ -221,6 +223,15 @@ struct SurfaceRelocation {
         return go(v, x, [&](const Vec<3>& p) { return quality(p) >= least && is_near(v, p) && !makes_smaller(here, p); });
     }
 
+    // On the way to a given place; the worst element gets no worse, unless it is still above the threshold.
+    bool go_ahead(std::int64_t v) {
+        const Vec<3> here = at(v);
+        const double before = quality(here), least = std::min(before, parameters.threshold_sine2) * (1.0 - SAME_SINE2);
+        const Vec<2> x = local(load<3>(ahead + v * 3));
+        if (!(before > 0.0) || x == star.position) return false;
+        return go(v, x, [&](const Vec<3>& p) { return quality(p) >= least && is_near(v, p) && !makes_smaller(here, p); });
+    }
+
     // To where elements that are too far from their shapes are least so, of some places on the way to the start and to the
     // mean of the neighbours; in a valid star, which stays valid.
     bool draw_back(std::int64_t v) {
@@ -267,7 +278,7 @@ struct SurfaceRelocation {
         if (parameters.freedom->anywhere(v)) return;
         states[v] = DONE;
         gather(v);
-        counts.moved += relocated(move, v);
+        counts.moved += ahead == nullptr ? relocated(move, v) : go_ahead(v);
         if (move == Move::laplacian) states[v] = DUE;
     }
 };

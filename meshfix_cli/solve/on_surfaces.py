@@ -29,6 +29,8 @@ Mask = NDArray[np.bool_]
 STEP = 0.5  # of the size of the elements of a region: the radius of the balls
 ROUNDS = 40  # of minimisations in a region
 ITERATIONS = 20  # of each
+MOST_LOOKS = 20_000_000  # of clusters at simplices: each looks at the whole mesh, and more rings make fewer clusters
+MOST_VERTICES = 10_000  # of a cluster: a larger one is no tangle that small steps mend
 
 
 def minimisations(
@@ -62,13 +64,18 @@ def minimisations(
 
 
 def _clusters(stars: kernels.Connectivity, near: Mask) -> Iterator[Mask]:
-    """Yield the parts (n,) of some vertices that are joined through neighbours, in the order of their first ones."""
+    """Yield the parts (n,) of some vertices that are joined through neighbours, in the order of their first ones.
+
+    Too many are none, and those that are too large are left out.
+    """
     begin = np.repeat(np.arange(len(near), dtype=np.int32), np.diff(stars.neighbour_offsets))
     both = near[begin] & near[stars.neighbours]
     pairs = np.stack([begin[both], stars.neighbours[both]], axis=1)
     number = np.where(near, kernels.joined(np.ascontiguousarray(pairs), len(near)), -1)
-    for first in np.unique(number[near]):
-        yield number == first
+    firsts, counts = np.unique(number[near], return_counts=True)
+    if len(firsts) * len(stars.simplices) <= MOST_LOOKS:
+        for first in firsts[counts <= MOST_VERTICES]:
+            yield number == first
 
 
 class OnSurfaces(FoldoverRegion):

@@ -5,6 +5,7 @@
 
 #define MODULE(name, variable) NB_MODULE(name, variable)
 MODULE(MESHFIX_MODULE, m) {
+    nanobind::set_leak_warnings(false);  // what a library keeps until the process ends is none of the user's
 #if MESHFIX_GNU && defined(__x86_64__)
     m.def("has_avx2", [] { return __builtin_cpu_supports("avx2") != 0; });
 #else

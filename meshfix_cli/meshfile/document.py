@@ -346,7 +346,7 @@ def _solved(source: Source) -> Solved:
     types = {run.type for run in solved.rest if len(run.vertices)}
     solid = sorted(one for one in types if dimension_of(one) == 3)
     found = ", ".join(solid or sorted(types)) or "none"
-    raise ReadError(f"there are no linear solid elements and no plane mesh of linear elements in it (cells: {found})")
+    raise ReadError(f"there are no elements in it that are judged, of solids, planes or surfaces (cells: {found})")
 
 
 def _check_named(source: Source) -> None:

@@ -14,11 +14,10 @@ from meshfix_cli.mesh.surface import in_planes, laid_out, seen
 from meshfix_cli.mesh.tangle import Tangle, normals_of_vertices
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.quality.summary import summarise
-from meshfix_cli.solve.records import Outcome, drain
+from meshfix_cli.solve.records import Outcome, SweepRecord, drain
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
-    from meshfix_cli.solve.records import SweepRecord
 
 ROUNDS = 3  # of untangling, at most: each finds its planes anew
 Mask = NDArray[np.bool_]
@@ -71,6 +70,7 @@ def surface_steps(
             break
     if best is mesh:
         best = laid_out(mesh, surface.kept, threads=threads, tangle=tangle)
+    yield best, _back_on_surface(best, moved, threads)  # smoothing may have nothing to do
     for moved, record in smooth(best):
         if record.phase != "input":
             yield moved, record
@@ -107,6 +107,13 @@ def _rank(mesh: Mesh, threads: int) -> tuple[int, int, float]:
     """Return how good a surface is: the smaller the better."""
     summary = summarise(mesh, threads=threads)
     return summary.inverted, summary.folded, -summary.smallest
+
+
+def _back_on_surface(mesh: Mesh, flat: Mesh, threads: int) -> SweepRecord:
+    """Return the record of a mesh that was in planes before."""
+    left, measure = mesh.check(threads)
+    gone = int((mesh.points != flat.points).any(axis=1).sum())
+    return SweepRecord("back to the shape", 1, left, measure, gone, 0.0)
 
 
 def _as_before(moved: Mesh, mesh: Mesh) -> Mesh:

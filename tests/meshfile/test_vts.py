@@ -101,7 +101,7 @@ def test_grids_without_points_are_refused(module: str, writer: str, kind: str, w
     [
         ('Extent="0 3 0 2 0 4"', 'Extent="0 3 0 2 0 5"', "its array 'Points' has less than"),
         ('Extent="0 3 0 2 0 4"', 'Extent="0 3 0 2"', "the Extent of a Piece is '0 3 0 2'"),
-        ('Extent="0 3 0 2 0 4"', 'Extent="0 3 0 2 4 0"', "has more than 0 numbers|no linear solid"),
+        ('Extent="0 3 0 2 0 4"', 'Extent="0 3 0 2 4 0"', "has more than 0 numbers|no elements in it"),
         ("<Piece", '<Piece Extent="0 0 0 0 0 0"/><Piece', "a structured grid in several pieces|0 arrays"),
     ],
 )

@@ -96,6 +96,18 @@ def test_without_a_reference_the_points_tell_the_surface(body: str) -> None:
     assert summarise(outcome.after).folded == 0
 
 
+@pytest.mark.parametrize("smooth", [0, "auto"])
+def test_what_is_untangled_in_planes_is_on_the_surface_again_where_nothing_is_smoothed(smooth: strategies.Smooth) -> None:
+    points, rows = surface_bodies.icosphere(2)
+    random, h = np.random.default_rng(1), laid(points, rows).mean_edge_length()
+    some = random.choice(len(points), len(points) // 20, replace=False)
+    points[some] += h * random.normal(size=(len(some), 3))
+    outcome = untangle(Mesh.build(points / np.linalg.norm(points, axis=1, keepdims=True), rows), smooth=smooth)
+    assert outcome.records[0].inverted > 0 and outcome.valid
+    off = np.abs(np.linalg.norm(outcome.after.points, axis=1) - 1)
+    assert off.max() < h**2 / 8  # the sag of a chord
+
+
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("body", BODIES)
 def test_what_is_mended_was_not_called_impossible(body: str, seed: int) -> None:

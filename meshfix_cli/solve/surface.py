@@ -71,9 +71,10 @@ def surface_steps(
             break
     if best is mesh:
         best = laid_out(mesh, surface.kept, threads=threads, tangle=tangle)
-    for moved, record in smooth(best):
-        if record.phase != "input":
-            yield moved, record
+    run = smooth(best)
+    best, record = next(run)
+    yield next(run, (best, replace(record, phase="best")))  # without smoothing nobody has seen what went back
+    yield from run
 
 
 def solved(run: Steps, threads: int) -> Outcome:

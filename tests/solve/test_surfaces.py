@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -53,6 +54,14 @@ def test_what_is_tangled_along_a_surface_is_untangled_with_a_reference(body: str
         on_sides = ((points == 0) | (points == 6)).any(axis=1)
         kept = (points == 0) | (points == 6)
         assert on_sides.all() and (outcome.after.points[kept] == points[kept]).all()
+
+
+@pytest.mark.parametrize("options", [{"smooth": 0}, {"only_invalid": True}])
+def test_what_is_not_smoothed_goes_back_to_the_surface_all_the_same(options: dict[str, Any]) -> None:
+    points, rows = torus()
+    outcome = untangle(Mesh.build(tangled(points, rows), rows), **options)
+    assert outcome.valid and outcome.records[-1].inverted == 0
+    assert off_torus(outcome.after.points).max() < 0.1 * outcome.before.mean_edge_length()
 
 
 @pytest.mark.parametrize("seed", range(120))

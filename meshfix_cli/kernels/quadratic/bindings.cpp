@@ -75,7 +75,6 @@ auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int
     return to_numpy(std::move(sizes));
 }
 
-// The smallest coefficient of each element, relative to sizes, of those that depend on a free node or of those that do not.
 // The smallest scaled Jacobian at nodes where it depends on no free node: infinite where there are none.
 auto ceilings_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const std::uint8_t>& free, int threads) {
     std::vector<double> ceilings(self.size());
@@ -92,6 +91,7 @@ auto ceilings_py(const QuadraticMesh& self, const Matrix<const double>& points, 
     return to_numpy(std::move(ceilings));
 }
 
+// The smallest coefficient of each element, relative to sizes, of those that depend on a free node or of those that do not.
 auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
                  const Vector<const std::uint8_t>& free, bool of_free, int threads) {
     std::vector<double> smallest(self.size(), INFINITY);

@@ -274,11 +274,12 @@ class Method:
         self, mesh: Mesh, reach: float, threads: int, reference: NDArray[np.float64] | None = None
     ) -> Steps:
         """Run what curved elements need, see `quadratic.curved_steps`."""
+        from meshfix_cli.solve.curved_shape import WELL
         from meshfix_cli.solve.quadratic import curved_steps
 
         smooth: Smooth = 0 if self.only_invalid or not self.smooth else "best" if self.smooth == "best" else SMOOTH
         threshold = THRESHOLD[mesh.dimension] if self.threshold is None else self.threshold
-        highest = {0: None, "best": 1.0}.get(smooth, math.sin(math.radians(threshold)))
+        highest = {0: None, "best": 1.0}.get(smooth, min(math.sin(math.radians(threshold)), WELL))
         untangling = replace(self, smooth=smooth)
         straight = partial(untangling.steps, reach=reach, threads=threads, reference=reference)
         return curved_steps(

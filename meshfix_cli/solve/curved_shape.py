@@ -5,6 +5,7 @@ To the energy of coefficients comes one of the scaled Jacobians at the nodes, wi
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -79,7 +80,7 @@ def better_shapes(
         jacobians = now.judged.scaled_jacobians
         some = left & (jacobians < held)
         worst = float(jacobians[some].min(initial=highest))
-        if not thorough and jacobians[left].min(initial=highest) < worst:
+        if not thorough and NEARLY * jacobians[left & ~some].min(initial=math.inf) <= worst:
             return np.zeros_like(some)  # held nodes keep the worst where it is
         return some & (jacobians < min(_aim(worst, gain), highest))
 

@@ -237,9 +237,9 @@ class _Run:
         return refused
 
     def _quality(self, seen: _Seen) -> Array:
-        """Return the smallest scaled Jacobian (m,) of each element at its nodes, and as a straight one."""
+        """Return the smallest scaled Jacobian (2, m) at the nodes of each element, and there and as a straight one."""
         straight = self.mesh.judge(self.mesh.straight(seen.points), self.limits.threads)
-        return np.minimum(seen.jacobians, straight.scaled_jacobians)
+        return np.stack([seen.jacobians, np.minimum(seen.jacobians, straight.scaled_jacobians)])
 
     def _smallest(self, points: Array, free: Mask, of_free: bool) -> Array:
         return self.mesh.kernel.smallest(points, self.sizes, free.astype(np.uint8), of_free, self.limits.threads)
@@ -258,12 +258,14 @@ class _Run:
 
 
 def _costs_too_much(before: Array, after: Array) -> bool:
-    """Whether the worst quality (m,) of the elements that change falls.
+    """Whether the worst of one of the qualities (2, m) of the elements that change falls.
 
-    Relative to the straight element coefficients rise as well where that becomes thin.
+    Relative to the straight element coefficients rise as well where that becomes thin; and where it is thinner than the
+    curved one, that could become so too.
     """
     changed = after != before
-    return bool(after[changed].min(initial=math.inf) < before[changed].min(initial=math.inf))
+    was, now = (one.min(axis=1, where=changed, initial=math.inf) for one in (before, after))
+    return bool((now < was).any())
 
 
 def relaxed(mesh: Quadratic, points: Array, limits: Limits, held: Mask) -> Array | None:

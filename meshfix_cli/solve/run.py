@@ -214,10 +214,11 @@ class Run(Positions):
         self.changed = kernels.moved(self.points, points, self.threads).view(bool)
         if self.only_invalid and not (phase.moves or phase.smooths):
             self.near = self.near | self.changed
-        self.points = points
+        moved = self._count(self.changed)
+        self.points = points if moved else self.points  # the array itself tells whether a mesh is another one
         self._check()
         sweep = self.record.sweep + 1 if self.record.phase == phase.name else 1
-        self.record = self._record(phase.name, sweep, self._count(self.changed))
+        self.record = self._record(phase.name, sweep, moved)
         self.untangling += not phase.smooths
         self.targeted = self.targeted or (phase.layers and self.left == 0)
         if Move.LAPLACIAN in phase.moves:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
+from time import process_time
 
 import numpy as np
 import pytest
@@ -74,3 +75,16 @@ def test_few_are_wrong_where_not_all_can_be_right(d: int) -> None:
     assert 0 in fewest and max(fewest) >= 2
     assert set(excess) <= {0, 1}
     assert np.mean(excess) < 0.05  # what is left out is chosen one by one
+
+
+def test_a_star_of_very_many_elements_takes_no_time() -> None:
+    """What does not hold the optimum down is not tried: with all that are wrong it would be minutes here."""
+    n, random = 1500, np.random.default_rng(0)
+    angles = 2 * np.pi * (np.arange(n) + random.uniform(-18, 18, n)) / n
+    points = np.concatenate([[[0.01, 0.02]], np.stack([np.cos(angles), np.sin(angles)], axis=1)])
+    mesh = Mesh.build(points, [("triangle", [[0, i + 1, (i + 1) % n + 1] for i in range(n)])])
+    assert mesh.check()[0] > n / 3
+    start = process_time()
+    for blocks in mesh.topology.colours:
+        relocate(mesh, Move.UNTANGLE_MOST, points.copy(), blocks)
+    assert process_time() - start < 5

@@ -9,7 +9,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from bent import FAMILIES, HIGHER, curved, mesh_of, straight
+from geometries import grid
 from monomials import jacobians, positions
+from refined import SERENDIPITY, refined
 
 from meshfix_cli.mesh.judged import VALID
 from meshfix_cli.mesh.quadratic import Array, Quadratic
@@ -111,3 +113,48 @@ def test_the_best_of_what_is_valid_moves_nothing_where_only_what_is_invalid_may_
     mesh = mesh_of(quadratic, points, "triangle6", straight("triangle6")[1], free)
     after = Method(smooth="best", only_invalid=True).solve(mesh, math.inf, 1).after
     assert after.points.tobytes() == points.tobytes()
+
+
+def sector(across: float, around: float) -> tuple[Quadratic, Array]:
+    """Return two triangles of six nodes that fill a part of a ring, and their nodes, all of which lie on circles."""
+    radius, angle = np.meshgrid(1 + across * np.linspace(0, 1, 3), around * np.linspace(0, 1, 3))
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=-1).reshape(-1, 2)
+    rows = np.array([[0, 2, 8, 1, 5, 4], [0, 8, 6, 4, 7, 3]], dtype=np.int32)
+    return Quadratic([("triangle6", rows)], len(points)), points
+
+
+@pytest.mark.parametrize(("across", "around"), [(1.0, 3.0), (0.1, 3.0), (1.0, 1.0)])
+def test_what_is_valid_and_curved_keeps_its_shape_though_its_straight_elements_are_thin(
+    across: float, around: float
+) -> None:
+    quadratic, points = sector(across, around)
+    free = np.arange(len(points)) == 4
+    mesh = mesh_of(quadratic, points, "triangle6", quadratic.nodes.reshape(2, 6), free)
+    after = Method().solve(mesh, math.inf, 1).after
+    before, there = (quadratic.judge(one.points, 1) for one in (mesh, after))
+    assert (before.verdicts == VALID).all() and (there.verdicts == VALID).all()
+    assert there.scaled_jacobians.min() >= before.scaled_jacobians.min()
+
+
+def test_where_an_element_that_is_held_is_as_bad_as_the_worst_none_moves() -> None:
+    """A shell is symmetric: those that nodes on the boundary keep bad are as bad as some that could rise."""
+    points, rows = grid(*(np.linspace(0, 1, 3),) * 3)
+    points, blocks = refined(points, [("tetra", rows)], SERENDIPITY)
+    inside = np.asarray(((points > 1e-9) & (points < 1 - 1e-9)).all(axis=1))
+    radius, angle = 1 + 0.5 * points[:, 0], 2 * points[:, 1]
+    bent = [radius * np.cos(angle), radius * np.sin(angle), points[:, 2] + 0.2 * np.sin(3 * points[:, 0])]
+    points = np.stack(bent, axis=1)
+    quadratic = Quadratic(blocks, len(points))
+    before, held = quadratic.judge(points, 1), quadratic.kernel.ceilings(points, inside.astype(np.uint8), 1)
+    assert (before.verdicts == VALID).all()
+    worst = float(before.scaled_jacobians.min())
+    assert held[before.scaled_jacobians <= worst * (1 + 1e-9)].min() == pytest.approx(worst)
+    assert not list(better_shapes(quadratic, points, Limits(inside, points), inside, 0.26, thorough=False))
+
+
+def test_the_highest_threshold_does_not_ask_for_all_that_best_does() -> None:
+    quadratic, points, free = curved("triangle6", 0.1)
+    mesh = mesh_of(quadratic, points, "triangle6", straight("triangle6")[1], free)
+    records = Method(threshold=90.0).solve(mesh, math.inf, 1).records
+    assert len(records) > 1
+    assert not any("straight elements" in record.phase for record in records)

@@ -227,9 +227,9 @@ def test_less_slides_where_more_leads_astray(monkeypatch: pytest.MonkeyPatch) ->
     assert silent == ()
 
 
-def freed(method: Method, document: Document, reference: Points | None = None) -> Document:
+def freed(method: Method, document: Document, reference: Points | None = None, with_shape: bool = True) -> Document:
     """As the method of this name, of documents that no file stands behind."""
-    del reference
+    del reference, with_shape
     return document if method.slide == "none" else replace(document, mesh=sliding(document.mesh))
 
 

@@ -28,6 +28,7 @@ constexpr double LP_IMPOSSIBLE = 1e-15;     // of the determinants: no smallest 
 constexpr double HELD_IMPOSSIBLE = 1e-14;   // of the star's size: heights up to which a vertex that slides makes nothing valid
 constexpr double HELD_FAR = 100.0;          // star sizes: how far it is looked for a place in a line or plane
 constexpr double LP_CLEAR = 1e-9;           // smallest height, in star sizes, where what is left of a star counts as mended
+constexpr int LP_MOST_LEFT_OUT = 64;        // elements of a star that stay wrong: where these are more, all of it stays
 constexpr double LP_PINCHED_SINE2 = 3e-4;     // sine squared, of one degree: below it smoothing tries the programme
 constexpr double LP_AXIS2 = 0.1;            // squared length, of the largest, at which a neighbour may set an axis
 constexpr int LP_BLAND_AFTER = 20;          // plus one per face: pivots before Bland's rule

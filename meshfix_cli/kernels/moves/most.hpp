@@ -27,13 +27,14 @@ class MostOfStar {
 
     // Whether there is an optimum, of determinants by areas, where fewer than so many elements are left out.
     bool solve(const Star<D>& star, Programme<D>& programme, int fewer_than) {
+        const auto limit = static_cast<std::size_t>(std::min(fewer_than, LP_MOST_LEFT_OUT));
         left_out_.clear();
-        while (static_cast<int>(left_out_.size()) < fewer_than && solve_without(NONE, star, programme)) {
+        while (left_out_.size() < limit && solve_without(NONE, star, programme)) {
             if (programme.smallest > LP_CLEAR) return true;
             double largest = -INFINITY;
             std::int32_t choice = NONE;
-            for (const std::int32_t owner : find_wrong(programme.position))
-                if (!is_left_out(owner) && solve_without(owner, star, programme) && programme.smallest > largest) {
+            for (const std::int32_t owner : find_lowest(star.directions, programme))
+                if (solve_without(owner, star, programme) && programme.smallest > largest) {
                     largest = programme.smallest;
                     choice = owner;
                 }
@@ -50,16 +51,28 @@ class MostOfStar {
         return std::find(left_out_.begin(), left_out_.end(), owner) != left_out_.end();
     }
 
-    // The corners of an element lie one behind the other.
-    const std::vector<std::int32_t>& find_wrong(const Vec<D>& x) {
-        wrong_.clear();
-        for (std::size_t i = 0; i < functions_.size(); ++i) {
-            const Affine<D>& f = functions_[i];
-            const bool right = f.value + dot(f.gradient, x) > LP_CLEAR * std::sqrt(norm2(f.gradient));
-            if (!right && (wrong_.empty() || wrong_.back() != owners_[i])) wrong_.push_back(owners_[i]);
-        }
-        return wrong_;
+    // Elements with such corners, which lie one behind the other.
+    template <class F>
+    const std::vector<std::int32_t>& find(const F& is_such) {
+        found_.clear();
+        for (std::size_t i = 0; i < functions_.size(); ++i)
+            if ((found_.empty() || found_.back() != owners_[i]) && is_such(i)) found_.push_back(owners_[i]);
+        return found_;
     }
+
+    const std::vector<std::int32_t>& find_wrong(const Vec<D>& x) {
+        return find([&](std::size_t i) { return !(at(i, x) > LP_CLEAR * std::sqrt(norm2(functions_[i].gradient))); });
+    }
+
+    // Those that hold the optimum down: without one of the others it is the same.
+    const std::vector<std::int32_t>& find_lowest(const Directions<D>& directions, const Programme<D>& programme) {
+        return find([&](std::size_t i) {
+            const double slope = std::sqrt(norm2(directions.along(functions_[i].gradient)));
+            return !is_left_out(owners_[i]) && at(i, programme.position) <= (programme.smallest + LP_CLEAR) * slope;
+        });
+    }
+
+    double at(std::size_t i, const Vec<D>& x) const { return functions_[i].value + dot(functions_[i].gradient, x); }
 
     bool solve_without(std::int32_t owner, const Star<D>& star, Programme<D>& programme) {
         kept_.clear();
@@ -69,7 +82,7 @@ class MostOfStar {
     }
 
     std::vector<Affine<D>> functions_{}, kept_{};  // of all corners, and of those that are not left out
-    std::vector<std::int32_t> owners_{}, left_out_{}, wrong_{};
+    std::vector<std::int32_t> owners_{}, left_out_{}, found_{};
 };
 
 }  // namespace meshfix

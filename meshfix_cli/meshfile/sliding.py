@@ -17,8 +17,10 @@ from meshfix_cli.meshfile.document import BY_FILE, ON_CELLS, Document
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.curved import Smooth
+    from meshfix_cli.mesh.freedom import Freedom
     from meshfix_cli.mesh.mesh import Mesh
 
+MOST = 0.5  # of the vertices of a surface or curve
 Int64 = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
@@ -59,11 +61,24 @@ def slid(
     if reference is not None:
         held |= topology.of_vertices(freedom.turned(reference, now))
     if smooth is not None:
-        held |= topology.of_vertices(freedom.rounded(now)[1] > smooth.bound)
+        held |= topology.of_vertices(_moved(freedom, now, smooth.bound))
     for reason, mask in document.holds.items():
         if reason not in (ON_BOUNDARY, ON_CELLS) and not (interfaces and reason.startswith(BETWEEN)):
             held |= mask
     return replace(document, mesh=mesh.sliding(freedom, held))
+
+
+def _moved(freedom: Freedom, points: NDArray[np.float64], bound: float) -> Mask:
+    """Mark the vertices (k,) that are off their shapes, and all of a shape from which most are: it has moved.
+
+    Those few of it that lie where it was, as two circles cross each other, would go back there.
+    """
+    off = freedom.rounded(points)[1] > bound
+    on_shape = np.flatnonzero(freedom.frame >= 0)
+    shapes = freedom.frame[on_shape]
+    has_moved = np.bincount(shapes, off[on_shape]) > MOST * np.bincount(shapes)
+    off[on_shape] |= has_moved[shapes]
+    return off
 
 
 def held_back(document: Document, after: Mesh, feature_angle: float) -> Iterator[str]:

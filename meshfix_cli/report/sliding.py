@@ -32,11 +32,11 @@ def _changed(shape: Mapping[str, Any], mesh: Mesh, tangled: bool) -> Iterator[st
     yield f"the {what} is within {shape['hausdorff']:.3g} of its shape (Hausdorff distance){changed}"
     if shape["beyond"]:
         facet = "facet" if solid else "edge"
-        left = ": they left it while elements were inverted, and found no way back" if tangled else ""
+        left = " or left it while elements were inverted, and found no way back" if tangled else ""
         far = counted(shape["beyond"], f"{facet} is", f"{facet}s are")
         yield (
             f"{far} farther from the shape than --max-deviation, {shape['bound']:.3g}, their middles by "
-            f"{shape['deviation']:.3g} at most{left}"
+            f"{shape['deviation']:.3g} at most: they came so{left}"
         )
     if shape["folds"]:
         where = counted(shape["folds"], "edge" if solid else "vertex", "edges" if solid else "vertices")

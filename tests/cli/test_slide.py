@@ -170,6 +170,18 @@ def test_a_boundary_that_has_left_the_reference_is_not_taken_back(tmp_path: Path
     assert np.array_equal(points_of(moved)[outer], points_of(pushed)[outer])
 
 
+def test_a_surface_that_has_moved_is_held_where_it_crosses_the_reference_too(tmp_path: Path) -> None:
+    """A sphere that has moved aside still lies on the old one along a circle."""
+    (clean, _), good = spheres(tmp_path), tmp_path / "good.vtk"
+    mesh = Mesh.build(*shell())
+    radius = np.linalg.norm(mesh.points, axis=1)
+    inner = radius < radius.min() + 1e-9
+    aside = written(tmp_path / "aside.vtk", mesh.with_points(mesh.points + 0.1 * inner[:, None] * [1, 0, 0]))
+    run("untangle", "--slide", "curved", "--reference", clean, aside, good)
+    assert np.array_equal(points_of(good)[inner], points_of(aside)[inner])
+    assert not np.array_equal(points_of(good), points_of(aside))
+
+
 def test_the_shape_is_kept_as_well_as_it_is_asked_for(tmp_path: Path) -> None:
     out, far = tmp_path / "out.vtk", {}
     for bound in ("0.01h", "0.1h"):

@@ -117,7 +117,7 @@ def test_what_is_no_element_holds_its_points(tmp_path: Path) -> None:
         ("         2         1         1        11", "         2         2         1        11", "several coordinate"),
         ("         2         1         1        11", "         2         1         1", "there are not 7 numbers"),
         ("  5.0000000000000000E-01", "  5.0000000000000000X-01", "line 12: '5.*' is not a number"),
-        ("  2412", "  2413\n", "no linear|no cells"),
+        ("  2412", "  2413\n", "no elements|no cells"),
         ("  2411", "    71", "it has no data set of points"),
         ("  2412", "    71", "has elements in the data set 71, which is not read"),
         ("  2412\n", "  2467\n", "line 16: a group does not begin with eight numbers"),

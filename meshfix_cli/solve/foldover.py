@@ -122,6 +122,13 @@ def minimisations(
         yield from region.minimise(embedded, sizes, effort)  # its positions are drawn into reach
 
 
+def around(
+    stars: kernels.Connectivity, free: NDArray[np.bool_], broken: NDArray[np.bool_], rings: int | None
+) -> NDArray[np.bool_]:
+    """Return the free vertices (n,) in so many rings around those of inverted elements; None: all."""
+    return free if rings is None else free & stars.grown(broken, rings).view(bool)
+
+
 def minimisations_in_regions(
     regions: tuple[int | None, ...],
     max_move: float,
@@ -136,7 +143,7 @@ def minimisations_in_regions(
     """Yield the points after each minimisation of the energy, in one region after the other; see `Phase.rings`."""
     reach = Reach(start, max_move)
     for rings in regions:
-        near = free if rings is None else free & stars.grown(broken, rings).view(bool)
+        near = around(stars, free, broken, rings)
         if rings is not None and 2 * near.sum() > free.sum():
             return  # as good as the whole mesh
         efforts = (QUICK, THOROUGH) if rings is None else (QUICK,)

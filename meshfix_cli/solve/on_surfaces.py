@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from meshfix_cli import kernels
 from meshfix_cli.mesh.judged import Judged
-from meshfix_cli.solve.foldover import QUICK, WEIGHT, FoldoverRegion, Reach, next_eps
+from meshfix_cli.solve.foldover import QUICK, WEIGHT, FoldoverRegion, Reach, around, next_eps
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.freedom import Freedom
@@ -54,8 +54,7 @@ def minimisations(
     while broken.any() and (left := len(judged.check(points, threads)[0])) < least:
         least = left
         for rings in regions:
-            near = free if rings is None else free & stars.grown(broken, rings).view(bool)
-            for cluster in _clusters(stars, near):
+            for cluster in _clusters(stars, around(stars, free, broken, rings)):
                 region = OnSurfaces(stars, cluster, Reach(start, max_move), threads, freedom)
                 points = region.mended(points)
             yield points

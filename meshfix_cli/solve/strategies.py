@@ -16,6 +16,7 @@ PASSES = 3  # section 4: three passes of smoothing
 MOST_PASSES = 1_000_000
 THRESHOLD = {2: 30.0, 3: 15.0}  # section 3.3, degrees, for plane and solid meshes
 SMOOTHING = "smoothing"
+BACK_TO_SHAPE = "back to the shape"
 FEATURE_ANGLE, MAX_DEVIATION = 40.0, 0.03  # degrees, and mean edge lengths: see `curved.Smooth`
 ROUNDS = 8  # of "best", at most, after the first
 TURNS, RATIO_SWEEPS, MEANS = 6, 6, 4  # of "best" where elements are not all simplices
@@ -146,7 +147,7 @@ _LP_MOST = Phase(
 )  # fmt: skip
 _EMBEDDING = Phase("embedding", max_sweeps=1, embeds=True)
 _BACK = Phase("back to the input", (Move.COME_BACK,), 100, until="settled", from_best=True)
-_TO_SHAPE = Phase("back to the shape", (Move.DRAW_BACK,), 100, until="settled", from_best=True, slides="curved")
+_TO_SHAPE = Phase(BACK_TO_SHAPE, (Move.DRAW_BACK,), 100, until="settled", from_best=True, slides="curved")
 _FOLDOVER = Phase("FF", max_sweeps=200, from_best=True, rings=(None,))
 _ON_SURFACES = replace(_FOLDOVER, name="FF on surfaces", max_sweeps=40, rings=(1, 2, 4, 8), slides="curved")
 

@@ -15,6 +15,7 @@ from meshfix_cli.mesh.tangle import Tangle, normals_of_vertices
 from meshfix_cli.quality.obstacles import find_obstacles
 from meshfix_cli.quality.summary import summarise
 from meshfix_cli.solve.records import Outcome, SweepRecord, drain
+from meshfix_cli.solve.strategies import BACK_TO_SHAPE
 
 if TYPE_CHECKING:
     from meshfix_cli.mesh.mesh import Mesh
@@ -62,15 +63,16 @@ def surface_steps(
                 yield _as_before(moved, mesh), record
             first = False
         now, around = _laid_on_sample(moved, flat, mesh, tangle, threads)
-        left = now.check(threads)[0]
+        left, measure = now.check(threads)
         if left >= inverted:
             break
-        best, tangle, inverted = now, around.without_doubtful(now, threads), left
+        best, tangle, inverted, smallest = now, around.without_doubtful(now, threads), left, measure
         if left == 0:
             break
     if best is mesh:
         best = laid_out(mesh, surface.kept, threads=threads, tangle=tangle)
-    yield best, _back_on_surface(best, moved, threads)  # smoothing may have nothing to do
+    gone = int((best.points != moved.points).any(axis=1).sum())
+    yield best, SweepRecord(BACK_TO_SHAPE, 1, inverted, smallest, gone, 0.0)  # smoothing may have nothing to do
     for moved, record in smooth(best):
         if record.phase != "input":
             yield moved, record
@@ -107,13 +109,6 @@ def _rank(mesh: Mesh, threads: int) -> tuple[int, int, float]:
     """Return how good a surface is: the smaller the better."""
     summary = summarise(mesh, threads=threads)
     return summary.inverted, summary.folded, -summary.smallest
-
-
-def _back_on_surface(mesh: Mesh, flat: Mesh, threads: int) -> SweepRecord:
-    """Return the record of a mesh that was in planes before."""
-    left, measure = mesh.check(threads)
-    gone = int((mesh.points != flat.points).any(axis=1).sum())
-    return SweepRecord("back to the shape", 1, left, measure, gone, 0.0)
 
 
 def _as_before(moved: Mesh, mesh: Mesh) -> Mesh:

@@ -125,10 +125,7 @@ void find_exclusive(const Connectivity& mesh, const StarsView& stars, const Free
         return take_certificate(program, ring.owners, found);
     }
     std::vector<Affine<D>> functions;
-    for (int i = 0; i < star.faces_count; ++i) {
-        const Edges<D> e = star.edges(i, Vec<D>{});
-        functions.push_back({determinant(e), determinant_slope(e)});
-    }
+    take_faces(star, functions);
     if (star.directions.curved())
         exclude_on_reference(star, functions, ring, found);
     else if (D == 3 && star.directions.count == 2)

@@ -29,6 +29,16 @@ struct Affine {
     Vec<D> gradient;
 };
 
+// The determinants of the faces of a star.
+template <int D>
+void take_faces(const Star<D>& star, std::vector<Affine<D>>& functions) {
+    functions.clear();
+    for (int i = 0; i < star.faces_count; ++i) {
+        const Edges<D> e = star.edges(i, Vec<D>{});
+        functions.push_back({determinant(e), determinant_slope(e)});
+    }
+}
+
 // Columns are numbered: the faces, in the blocks of the star (its last face may stand there twice, which changes
 // nothing), then +e_0, -e_0, +e_1, ...
 template <int D>

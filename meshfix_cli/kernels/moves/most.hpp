@@ -13,13 +13,10 @@ template <int D>
 class MostOfStar {
  public:
     void set(const Star<D>& star, const StarsView& stars, std::int64_t v) {
-        functions_.clear();
+        take_faces(star, functions_);
         owners_.clear();
-        for (int i = 0; i < star.faces_count; ++i) {
-            const Edges<D> e = star.edges(i, Vec<D>{});
-            functions_.push_back({determinant(e), determinant_slope(e)});
+        for (int i = 0; i < star.faces_count; ++i)
             owners_.push_back(stars.elements == nullptr ? i : stars.element_of(stars.corners[stars.offsets[v] + i], D + 1));
-        }
     }
 
     // How many elements have a corner that is not clearly positive.

@@ -20,11 +20,7 @@ class Programme {
             anywhere_.set(star, heights);
             return take(anywhere_);
         }
-        faces_.clear();
-        for (int i = 0; i < star.faces_count; ++i) {
-            const Edges<D> e = star.edges(i, Vec<D>{});
-            faces_.push_back({determinant(e), determinant_slope(e)});
-        }
+        take_faces(star, faces_);
         return solve(star, faces_, heights);
     }
 

@@ -63,52 +63,49 @@ auto judge_py(const QuadraticMesh& self, const Matrix<const double>& points, int
                            to_numpy(std::move(found.measure)), to_numpy(std::move(found.quality)));
 }
 
-auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
-    std::vector<double> sizes(self.size());
+// A number (m) of each element: f(its dimension, its room, which it is).
+template <class F>
+auto of_elements(const QuadraticMesh& self, const Matrix<const double>& points, int threads, const F& f) {
+    std::vector<double> found(self.size());
     with_room(self, points.shape(1), [&](auto dimension, auto room) {
-        constexpr int D = dimension;
-        using R = decltype(room);
         for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-            for (std::int64_t e = begin; e < end; ++e) sizes[e] = straight_size<D, R>(self.type(e), self.local<D, R>(points.data(), e));
+            for (std::int64_t e = begin; e < end; ++e) found[e] = f(dimension, room, e);
         });
     });
-    return to_numpy(std::move(sizes));
+    return to_numpy(std::move(found));
+}
+
+auto sizes_py(const QuadraticMesh& self, const Matrix<const double>& points, int threads) {
+    return of_elements(self, points, threads, [&](auto dimension, auto room, std::int64_t e) {
+        constexpr int D = dimension;
+        using R = decltype(room);
+        return straight_size<D, R>(self.type(e), self.local<D, R>(points.data(), e));
+    });
 }
 
 // The smallest scaled Jacobian of each element at nodes where it depends on no free node: infinite where there are none.
 auto ceilings_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const std::uint8_t>& free, int threads) {
-    std::vector<double> ceilings(self.size());
-    with_room(self, points.shape(1), [&](auto dimension, auto room) {
+    return of_elements(self, points, threads, [&](auto dimension, auto room, std::int64_t e) {
         constexpr int D = dimension;
         using R = decltype(room);
-        for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-            for (std::int64_t e = begin; e < end; ++e) {
-                const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
-                ceilings[e] = scaled_jacobian(parts, self.marked(free.data(), e));
-            }
-        });
+        const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
+        return scaled_jacobian(parts, self.marked(free.data(), e));
     });
-    return to_numpy(std::move(ceilings));
 }
 
 // The smallest coefficient of each element, relative to sizes, of those that depend on a free node or of those that do not.
 auto smallest_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,
                  const Vector<const std::uint8_t>& free, bool of_free, int threads) {
-    std::vector<double> smallest(self.size(), INFINITY);
-    with_room(self, points.shape(1), [&](auto dimension, auto room) {
+    return of_elements(self, points, threads, [&](auto dimension, auto room, std::int64_t e) {
         constexpr int D = dimension;
         using R = decltype(room);
-        for_each_range(self.size(), QUADRATIC_PER_ITEM, threads, [&](std::int64_t begin, std::int64_t end, std::int64_t) {
-            for (std::int64_t e = begin; e < end; ++e) {
-                const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
-                const NodeSet here = self.marked(free.data(), e);
-                for (int i = 0; i < parts.type->coefficients; ++i)
-                    if ((parts.type->depends[i] & here).any() == of_free)
-                        smallest[e] = std::min(smallest[e], parts.coefficient[i] / sizes.data()[e]);
-            }
-        });
+        const QuadraticParts<D, R> parts(self.type(e), self.local<D, R>(points.data(), e));
+        const NodeSet here = self.marked(free.data(), e);
+        double smallest = INFINITY;
+        for (int i = 0; i < parts.type->coefficients; ++i)
+            if ((parts.type->depends[i] & here).any() == of_free) smallest = std::min(smallest, parts.coefficient[i] / sizes.data()[e]);
+        return smallest;
     });
-    return to_numpy(std::move(smallest));
 }
 
 auto relocate_py(const QuadraticMesh& self, const Matrix<const double>& points, const Vector<const double>& sizes,

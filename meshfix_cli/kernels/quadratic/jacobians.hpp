@@ -24,7 +24,7 @@ struct SmoothJacobian {
         }
         const T scale = constant<T>(type.weight) / square_root(product2);
         value = scale * determinant(e_);
-        const Edges<D, T> cofactors = of_determinant();
+        const Edges<D, T> cofactors = determinant_slopes(e_);
         for (int j = 0; j < D; ++j) slope[j] = scale * cofactors[j] - value * half_[j];
     }
 
@@ -67,13 +67,6 @@ struct SmoothJacobian {
     static T eighth_power(T x) {
         const T x2 = x * x, x4 = x2 * x2;
         return x4 * x4;
-    }
-
-    Edges<D, T> of_determinant() const {
-        if constexpr (D == 2)
-            return {{{e_[1][1], -e_[1][0]}, {-e_[0][1], e_[0][0]}}};
-        else
-            return {{cross(e_[1], e_[2]), cross(e_[2], e_[0]), cross(e_[0], e_[1])}};
     }
 };
 
